@@ -1,0 +1,1 @@
+"""Reading what scanners and CAD systems write: files in, checked arrays out."""

@@ -1,0 +1,127 @@
+"""Stage 2, the measuring method: what a plugin is given, and what it hands back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Protocol, runtime_checkable
+
+import numpy as np
+
+from inspect3d.arrays import Floats, floats
+from inspect3d.nominal.nominal import Nominal
+from inspect3d.outcome import InputError
+
+
+@dataclass(frozen=True)
+class Files:
+    """The files a recipe names for one measurement, by the recipe's key (`files`, `images`, `cameras`, ...).
+
+    Parameters
+    ----------
+    folder : where the recipe lies; relative paths start here
+    paths : for each key the files in the recipe's order, existing ones
+    """
+
+    folder: Path
+    paths: Mapping[str, tuple[Path, ...]]
+
+    def __getitem__(self, key: str) -> tuple[Path, ...]:
+        """Return the files of a key.
+
+        Raises
+        ------
+        InputError
+            The recipe names none.
+        """
+        if not self.paths.get(key):
+            raise InputError(f"The measurement names no `{key}`: add {key} = [...] to its table in the recipe.")
+        return self.paths[key]
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """Measured points in one frame, aligned to the CAD as one body.
+
+    Parameters
+    ----------
+    name : what to call it in messages, a file name or several
+    points : (n, 3) mm
+    normals : (n, 3), unit, out of the material as far as the instrument knows; zero or None where it does not
+    noise : standard uncertainty of a point along the surface normal, mm; None: to be estimated from the cloud
+    """
+
+    name: str
+    points: Floats
+    normals: Floats | None = None
+    noise: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", floats(self.points, "points", None, 3))
+        if self.normals is not None:
+            object.__setattr__(self, "normals", floats(self.normals, "normals", len(self.points), 3))
+        if self.noise is not None and not self.noise > 0:
+            raise ValueError(f"the noise of a cloud is positive, not {self.noise}")
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self.points)
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """What a method measured, before it is aligned to the CAD.
+
+    Parameters
+    ----------
+    clouds : one or more, each aligned by itself; a point belongs to exactly one
+    frame : "instrument" (to be aligned) or "cad" (already there; a start "auto" then begins at the identity)
+    scale_known : False where the method cannot see the scale (COLMAP without cameras)
+    remarks : what was done to the data that the report must say, a sentence each
+    """
+
+    clouds: tuple[Cloud, ...]
+    frame: Literal["instrument", "cad"] = "instrument"
+    scale_known: bool = True
+    remarks: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.clouds:
+            raise ValueError("a measurement holds at least one cloud")
+
+    @property
+    def points(self) -> Floats:
+        """Return all points (n, 3) mm in the order of the clouds."""
+        return np.concatenate([cloud.points for cloud in self.clouds])
+
+
+@runtime_checkable
+class Measure(Protocol):
+    """A measuring method: a frozen dataclass whose fields are its settings.
+
+    Its `repr` is the provenance line of the report. It is registered under the entry point group
+    `inspect3d.measurements`; the recipe's table, less the keys that every method shares, builds it.
+    """
+
+    def open(self, files: Files) -> Any:
+        """Read and check the files of the recipe.
+
+        Returns
+        -------
+        the source the call measures from; its `str` is one line for `inspect3d check`
+
+        Raises
+        ------
+        InputError
+            A file is missing, broken or not of this method.
+        """
+
+    def __call__(self, source: Any, nominal: Nominal) -> Measurement:
+        """Measure.
+
+        Raises
+        ------
+        MeasurementError
+            The data give no answer; says why and what to do.
+        """

@@ -1,0 +1,80 @@
+"""Everything a finished inspection knows: what the report shows and results.json keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from inspect3d.arrays import Floats, Integers
+from inspect3d.deviate.deviation import Deviation
+from inspect3d.nominal.nominal import Nominal
+from inspect3d.outcome import Status
+from inspect3d.register.alignment import Alignment, Candidate
+
+if TYPE_CHECKING:
+    from inspect3d.recipe import Recipe
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPart:
+    """How one measurement of the recipe ended.
+
+    Parameters
+    ----------
+    name, method, provenance : of the measurement; provenance is the plugin's repr
+    status, reason : how it ended; `reason` is a sentence, empty where all is well
+    seconds : time per stage
+    alignments : one per cloud that was aligned by itself; empty where there is no answer
+    candidates : the poses considered, where the measurement ended ambiguous or failed
+    deviation : the map, or None where there is none
+    verdict : (n,) 0 none, 1 conform, 2 undecided, 3 nonconform, per node; None without a tolerance
+    points_cad : (k, 3) mm, the measured points in the CAD frame in the order of the files; None for stereo methods
+    point_deviation : (k,) mm, NaN where a point has none
+    remarks : what was done that the reader must know, a sentence each
+    """
+
+    name: str
+    method: str
+    provenance: str
+    status: Status
+    reason: str = ""
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    alignments: tuple[Alignment, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    deviation: Deviation | None = None
+    verdict: Integers | None = None
+    points_cad: Floats | None = None
+    point_deviation: Floats | None = None
+    noise: float | None = None
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class InputFile:
+    """A file the inspection read: path relative to the recipe, and what was in it."""
+
+    path: str
+    sha256: str
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """A finished inspection.
+
+    Parameters
+    ----------
+    recipe : as validated
+    nominal : the part as designed
+    parts : how each measurement ended, in the recipe's order
+    inputs : the files read
+    versions : of inspect3d, Python and the libraries that computed the result
+    warnings : what the recipe asked for and did not get, a sentence each
+    """
+
+    recipe: Recipe
+    nominal: Nominal
+    parts: tuple[MeasuredPart, ...]
+    inputs: tuple[InputFile, ...]
+    versions: Mapping[str, str]
+    warnings: tuple[str, ...] = ()

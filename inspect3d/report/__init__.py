@@ -1,0 +1,1 @@
+"""Stage 6, pictures, the HTML report and tables."""
