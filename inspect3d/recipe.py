@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, field_validator, model_validator
 
 from inspect3d.complaint import complaint
@@ -115,7 +116,7 @@ class Start(_Table):
         if self.start == "landmarks" and len(self.landmarks) < 3:
             raise ValueError(f'start = "landmarks" needs at least 3 landmarks, and there are {len(self.landmarks)}')
         if self.matrix is not None:
-            Pose.from_matrix(self.matrix)
+            Pose.from_matrix(np.array(self.matrix))
         return self
 
 

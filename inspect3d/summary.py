@@ -1,0 +1,33 @@
+"""A finished inspection in a few lines, for the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from inspect3d.deviate.statistics import Statistics
+from inspect3d.record import MeasuredPart, Record
+
+
+def summary(record: Record, out: Path) -> Iterator[str]:
+    """Yield how each measurement ended, its figures, the warnings, and where the report lies."""
+    for part in record.parts:
+        yield f"{part.name} ({part.method}): {part.reason or part.status.words}"
+        if part.deviation is not None:
+            yield f"    {_figures(part, record)}"
+    yield from (f"warning: {warning}" for warning in record.warnings)
+    yield f"report: {out / 'report.html'}"
+
+
+def _figures(part: MeasuredPart, record: Record) -> str:
+    deviation, mesh = part.deviation, record.nominal.mesh
+    assert deviation is not None
+    observed = deviation.observed
+    if not observed.any():
+        return "no node was observed"
+    figures = Statistics.of(deviation.value[observed], mesh.areas[observed])
+    sigma = np.median(deviation.sigma[observed])
+    nodes = f"{np.count_nonzero(observed)} of {len(mesh)} nodes observed"
+    return f"mean {figures.mean:+.4f} mm, std {figures.std:.4f} mm, median sigma {sigma:.4f} mm; {nodes}"
