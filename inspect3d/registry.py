@@ -103,7 +103,7 @@ def _package(entry: EntryPoint) -> str:
 def _is_method(plugin: Any) -> bool:
     if not (isinstance(plugin, type) and is_dataclass(plugin) and issubclass(plugin, Measure)):
         return False
-    return plugin.__dataclass_params__.frozen
+    return "__setattr__" in vars(plugin)
 
 
 def _no_such(name: str) -> str:
