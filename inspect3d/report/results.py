@@ -1,0 +1,190 @@
+"""The inspection as numbers: what `results.json` holds."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from inspect3d.deviate.statistics import Statistics, percentiles
+from inspect3d.nominal.nominal import InspectionMesh
+from inspect3d.record import MeasuredPart, Record
+from inspect3d.register.alignment import Alignment, Candidate
+from inspect3d.report.names import Stem
+from inspect3d.report.reading import Reading, readings
+
+SCHEMA = 1
+FIGURES = ("mean", "std", "rms", "min", "max", "p05", "p50", "p95")
+VERDICTS = ("conform", "undecided", "nonconform")
+
+
+def results(record: Record, stems: Mapping[str, Stem]) -> dict[str, Any]:
+    """Return the inspection as plain lists, numbers and strings; lengths in mm, angles in rad, sigmas at k = 1.
+
+    The figures are given in full; rounding belongs to the report. What is not known is None.
+    """
+    mesh = record.nominal.mesh
+    return {
+        "schema": SCHEMA,
+        "part": _part(record),
+        "versions": dict(record.versions),
+        "inputs": [{"path": file.path, "sha256": file.sha256} for file in record.inputs],
+        "warnings": list(record.warnings),
+        "measurements": {part.name: _measurement(record, mesh, part, stems[part.name]) for part in record.parts},
+        "comparisons": [],
+    }
+
+
+def as_json(values: Mapping[str, Any]) -> str:
+    """Return readable JSON, the same text for the same values; NaN and infinity, which JSON lacks, become null.
+
+    A list of numbers stays on one line, so that a matrix looks like one.
+    """
+    return _text(_plain(values), "") + "\n"
+
+
+def verdict_shares(mesh: InspectionMesh, part: MeasuredPart) -> dict[str, float] | None:
+    """Return the shares of the area that conform, are undecided, do not conform or were not measured; their sum is 1.
+
+    Creases have no deviation and count as not measured. Observed nodes without a tolerance are left out. None where
+    the measurement was not judged.
+    """
+    if part.deviation is None or part.verdict is None:
+        return None
+    verdict = np.asarray(part.verdict)
+    area = {name: mesh.areas[verdict == k].sum() for k, name in enumerate(VERDICTS, start=1)}
+    area["unmeasured"] = mesh.areas[~part.deviation.observed].sum()
+    whole = sum(area.values())
+    return {name: float(value / whole) for name, value in area.items()} if whole > 0 else None
+
+
+def _part(record: Record) -> dict[str, Any]:
+    table, mesh = record.recipe.part, record.nominal.mesh
+    return {
+        "name": table.name,
+        "cad": table.cad,
+        "tolerance": list(table.tolerance) if table.tolerance else None,
+        "probability": table.probability,
+        "nodes": len(mesh),
+        "triangles": len(mesh.triangles),
+        "edge_length": mesh.edge_length,
+        "area": float(mesh.areas.sum()),
+        "bounds": [mesh.nodes.min(axis=0).tolist(), mesh.nodes.max(axis=0).tolist()],
+        "remarks": list(record.nominal.remarks),
+    }
+
+
+def _measurement(record: Record, mesh: InspectionMesh, part: MeasuredPart, stem: Stem) -> dict[str, Any]:
+    has_map = part.status.has_map and part.deviation is not None
+    files = {"map": f"{stem.text}.vtp"} if has_map else {}
+    if has_map and part.points_cad is not None:
+        files["points"] = f"{stem.cloud}.vtp"
+    return {
+        "method": part.method,
+        "provenance": part.provenance,
+        "status": part.status.value,
+        "reason": part.reason,
+        "files": files,
+        "alignment": _alignment(part) if has_map else _no_alignment(part),
+        "deviation": _deviation(mesh, part) if has_map else None,
+        "verdict": verdict_shares(mesh, part) if has_map else None,
+        "labels": [_label(reading) for reading in readings(mesh, part, record.recipe.report.labels)],
+        "noise": part.noise,
+        "hidden": [],
+        "remarks": list(part.remarks),
+        "seconds": {stage: float(seconds) for stage, seconds in part.seconds.items()},
+    }
+
+
+def _alignment(part: MeasuredPart) -> dict[str, Any] | None:
+    if not part.alignments:
+        return None
+    each = [_one_alignment(alignment) for alignment in part.alignments]
+    return each[0] | ({"files": each} if len(each) > 1 else {})
+
+
+def _one_alignment(alignment: Alignment) -> dict[str, Any]:
+    return {
+        "matrix": alignment.cad_from_measured.matrix.tolist(),
+        "scale": float(alignment.scale),
+        "residual": float(alignment.residual),
+        "covariance": alignment.covariance.tolist(),
+        "covariance_origin": alignment.origin.tolist(),
+        "free": [{"words": free.words, "direction": np.asarray(free.direction).tolist()} for free in alignment.free],
+        "candidates": [_candidate(candidate) for candidate in alignment.candidates],
+        "used": alignment.count,
+    }
+
+
+def _no_alignment(part: MeasuredPart) -> dict[str, Any]:
+    none = dict.fromkeys(("matrix", "scale", "residual", "covariance", "covariance_origin"))
+    return none | {"free": [], "candidates": [_candidate(each) for each in candidates(part)], "used": None}
+
+
+def candidates(part: MeasuredPart) -> tuple[Candidate, ...]:
+    """Return the poses that were considered, best first."""
+    if part.candidates:
+        return part.candidates
+    return part.alignments[0].candidates if part.alignments else ()
+
+
+def _candidate(candidate: Candidate) -> dict[str, Any]:
+    return {
+        "matrix": candidate.pose.matrix.tolist(),
+        "scale": float(candidate.scale),
+        "residual": float(candidate.residual),
+    }
+
+
+def _deviation(mesh: InspectionMesh, part: MeasuredPart) -> dict[str, Any] | None:
+    if part.deviation is None:
+        return None
+    observed = part.deviation.observed
+    areas = mesh.areas[observed]
+    counts = {"nodes": len(mesh), "observed": int(observed.sum())}
+    if not areas.sum() > 0:
+        return counts | dict.fromkeys((*FIGURES, "sigma_p50", "sigma_p95")) | {"observed_area": 0.0}
+    figures = asdict(Statistics.of(part.deviation.value[observed], areas))
+    median, high = percentiles(part.deviation.sigma[observed], areas, (50.0, 95.0))
+    return (
+        counts
+        | {name: figures[name] for name in FIGURES}
+        | {"sigma_p50": float(median), "sigma_p95": float(high)}
+        | {"observed_area": float(areas.sum() / mesh.areas.sum())}
+    )
+
+
+def _label(reading: Reading) -> dict[str, Any]:
+    return {
+        "name": reading.name,
+        "point": reading.asked.tolist(),
+        "node": reading.node,
+        "deviation": reading.value,
+        "sigma": reading.sigma,
+    }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _text(value: Any, indent: str) -> str:
+    deeper = indent + "  "
+    if isinstance(value, dict) and value:
+        lines = [f"{deeper}{json.dumps(key, ensure_ascii=False)}: {_text(each, deeper)}" for key, each in value.items()]
+        return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
+    if isinstance(value, list) and any(isinstance(each, dict | list | str) for each in value):
+        return "[\n" + ",\n".join(deeper + _text(each, deeper) for each in value) + f"\n{indent}]"
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)

@@ -1,0 +1,224 @@
+"""The part in three dimensions, drawn without a screen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inspect3d.arrays import Booleans, Floats, Integers
+from inspect3d.report.colours import UNMEASURED, ColourScale
+from inspect3d.report.viewpoint import Viewpoint
+
+if TYPE_CHECKING:
+    from pyvista import Plotter, PolyData
+
+BACK = "#6f7683"
+LINES = "#3a3f47"
+SHARP = 30.0
+"""Degrees between facets from which an edge is drawn."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """A picture of the part, and where points of the part lie in it.
+
+    Parameters
+    ----------
+    image : (height, width, 3) uint8
+    nearness : (height, width) mm, of what is seen, towards the eye from the scene's centre; NaN beside the part
+    axes : (3, 3) rows right, up, towards the eye
+    centre : (3,) mm, the point in the middle of the picture
+    pixel : mm per pixel
+    """
+
+    image: NDArray[np.uint8]
+    nearness: Floats
+    axes: Floats
+    centre: Floats
+    pixel: float
+
+    def pixels(self, points: Floats) -> Floats:
+        """Return the pixels (n, 2) of points (n, 3) mm: right and down from the corner at the top left."""
+        height, width = self.nearness.shape
+        right, up, _ = self.axes @ (points - self.centre).T / self.pixel
+        return np.column_stack([width / 2 - 0.5 + right, height / 2 - 0.5 - up])
+
+    def sees(self, points: Floats, normals: Floats) -> Booleans:
+        """Tell which points (n, 3) mm of the surface face the eye and are not hidden, (n,)."""
+        height, width = self.nearness.shape
+        column, row = np.round(self.pixels(points)).astype(np.int64).T
+        inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        cosine = normals @ self.axes[2]
+        nearness = (points - self.centre) @ self.axes[2]
+        slope = np.sqrt(1 / np.clip(cosine, 0.1, 1.0) ** 2 - 1)
+        seen = self.nearness[row.clip(0, height - 1), column.clip(0, width - 1)]
+        return inside & (cosine > 0.1) & ~(nearness < seen - self.pixel * (2 + 2 * slope))
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """An open window nobody sees; draws the same part from many sides."""
+
+    plotter: Plotter
+    centre: Floats
+    corners: Floats
+
+    def draw(self, viewpoint: Viewpoint, fill: float = 0.96) -> Drawing:
+        """Return the picture from a viewpoint, the part filling that share of the window."""
+        width, height = self.plotter.window_size
+        axes = viewpoint.axes
+        right, up, near = axes @ (self.corners - self.centre).T
+        pixel = max(np.ptp(right) / width, np.ptp(up) / height) / fill or 1.0
+        middle = [(span.max() + span.min()) / 2 for span in (right, up, near)]
+        centre = self.centre + middle @ axes
+        far = float(np.linalg.norm(self.corners - self.centre, axis=1).max()) * 4 or 1.0
+        camera = self.plotter.camera
+        camera.parallel_projection = True
+        camera.focal_point = tuple(centre)
+        camera.position = tuple(centre + far * axes[2])
+        camera.up = tuple(axes[1])
+        camera.parallel_scale = pixel * height / 2
+        camera.clipping_range = (far * 0.25, far * 1.75)
+        self.plotter.render()
+        image = np.ascontiguousarray(self.plotter.screenshot(return_img=True)[..., :3])
+        nearness = far + np.asarray(self.plotter.get_image_depth(fill_value=np.nan), dtype=np.float64)
+        return Drawing(image, nearness, axes, centre, float(pixel))
+
+
+@contextmanager
+def scene(
+    nodes: Floats, triangles: Integers, values: Floats, scale: ColourScale | None, size: tuple[int, int]
+) -> Iterator[Scene]:
+    """Open a window on a coloured surface; it is closed when the block ends.
+
+    Parameters
+    ----------
+    nodes : (n, 3) mm
+    triangles : (m, 3)
+    values : (n,), NaN where there is nothing to show; those nodes are grey, as far as half-way to the next one
+    scale : how values become colours; None draws the part in grey
+    size : width and height, px
+    """
+    _silence()
+    from pyvista import Plotter, PolyData
+
+    surface = PolyData.from_regular_faces(np.array(nodes), np.array(triangles))
+    plotter = Plotter(off_screen=True, window_size=list(size), lighting="none")
+    try:
+        plotter.set_background("white")
+        _light(plotter)
+        shown = np.isfinite(values)
+        if scale is None or not shown.any():
+            _add(plotter, _shaded(surface), color=_grey())
+        elif scale.classes:
+            _add_classes(plotter, surface, values, scale)
+        else:
+            _add_field(plotter, surface, values, scale)
+        edges = surface.extract_feature_edges(SHARP, non_manifold_edges=False, manifold_edges=False)
+        if edges.n_cells:
+            plotter.add_mesh(edges, color=LINES, line_width=1.2, lighting=False)
+        centre = (nodes.min(axis=0) + nodes.max(axis=0)) / 2
+        yield Scene(plotter, centre, np.asarray(nodes))
+    finally:
+        plotter.close()
+
+
+def _add_field(plotter: Plotter, surface: PolyData, values: Floats, scale: ColourScale) -> None:
+    from matplotlib.colors import ListedColormap
+
+    shaded = _shaded(surface, value=values)
+    value, shown = np.array(shaded.point_data["value"]), np.isfinite(shaded.point_data["value"])
+    shaded.point_data["shown"] = shown.astype(np.float64)
+    shaded.point_data["value"] = _filled(value, shown, shaded.regular_faces)
+    measured, rest = shaded.clip_scalar(scalars="shown", invert=False, value=0.5, both=True)
+    if measured.n_cells:
+        colours = ListedColormap(scale.colours / 255.0)
+        _add(plotter, measured, scalars="value", cmap=colours, clim=scale.limits)
+    if rest.n_cells:
+        _add(plotter, rest, color=_grey())
+
+
+def _add_classes(plotter: Plotter, surface: PolyData, values: Floats, scale: ColourScale) -> None:
+    from pyvista import PolyData
+
+    triangles = surface.regular_faces
+    points, pieces, owner = _cells_of_nodes(np.asarray(surface.points), triangles)
+    shaded = _shaded(PolyData.from_regular_faces(points, pieces), node=owner.astype(np.float64), on="cell")
+    index = np.nan_to_num(values[np.asarray(shaded.cell_data["node"]).astype(np.int64)]).astype(np.int64)
+    palette = np.vstack([np.array(UNMEASURED, dtype=np.uint8), scale.colours])
+    shaded.cell_data["colour"] = palette[index]
+    _add(plotter, shaded, scalars="colour", rgb=True, preference="cell")
+
+
+def _add(plotter: Plotter, surface: PolyData, **colours: object) -> None:
+    """Add a surface whose normals are set; bright enough that its colours are those of the colour bar."""
+    back = {"color": BACK, "ambient": 0.4, "diffuse": 0.5}
+    actor = plotter.add_mesh(
+        surface, ambient=0.72, diffuse=0.34, show_scalar_bar=False, backface_params=back, **colours
+    )
+    actor.prop.interpolation = "phong"
+
+
+def _cells_of_nodes(nodes: Floats, triangles: Integers) -> tuple[Floats, Integers, Integers]:
+    """Return the surface in smaller triangles, six to one, and the node each belongs to."""
+    corners = nodes[triangles]
+    middles = (corners + np.roll(corners, -1, axis=1)) / 2
+    points = np.concatenate([nodes, middles.reshape(-1, 3), corners.mean(axis=1)])
+    n, m = len(nodes), len(triangles)
+    middle = n + np.arange(3 * m).reshape(m, 3)
+    centre = n + 3 * m + np.arange(m)
+    pieces, owner = [], []
+    for k in range(3):
+        pieces.append(np.column_stack([triangles[:, k], middle[:, k], centre]))
+        pieces.append(np.column_stack([triangles[:, k], centre, middle[:, k - 1]]))
+        owner += [triangles[:, k], triangles[:, k]]
+    return points, np.concatenate(pieces), np.concatenate(owner)
+
+
+def _filled(values: Floats, shown: Booleans, triangles: Integers) -> Floats:
+    """Return the values with the mean of the shown neighbours where a node has none."""
+    pairs = np.concatenate([triangles[:, [a, b]] for a in range(3) for b in range(3) if a != b])
+    pairs = pairs[~shown[pairs[:, 0]] & shown[pairs[:, 1]]]
+    total = np.bincount(pairs[:, 0], values[pairs[:, 1]], minlength=len(values))
+    count = np.bincount(pairs[:, 0], minlength=len(values))
+    return np.where(shown, values, total / np.maximum(count, 1))
+
+
+def _shaded(surface: PolyData, on: str = "point", **fields: Floats) -> PolyData:
+    """Return the surface with a normal at every point, split along sharp edges, and the fields carried over."""
+    data = surface.point_data if on == "point" else surface.cell_data
+    for name, field in fields.items():
+        data[name] = field
+    return surface.compute_normals(
+        cell_normals=False,
+        split_vertices=True,
+        feature_angle=SHARP,
+        consistent_normals=False,
+        auto_orient_normals=False,
+    )
+
+
+def _light(plotter: Plotter) -> None:
+    from pyvista import Light
+
+    for position, intensity in (((0.0, 0.0, 1.0), 0.6), ((-0.7, 0.9, 0.8), 0.55)):
+        light = Light(light_type="camera light", intensity=intensity)
+        light.position = position
+        light.focal_point = (0.0, 0.0, 0.0)
+        plotter.add_light(light)
+
+
+def _grey() -> tuple[float, ...]:
+    return tuple(channel / 255 for channel in UNMEASURED)
+
+
+def _silence() -> None:
+    """Keep VTK from writing to standard error that there is no X server: it then draws through EGL."""
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)

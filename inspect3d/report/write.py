@@ -1,0 +1,43 @@
+"""Stage 6: everything a run leaves behind."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+
+from inspect3d.progress import Progress
+from inspect3d.record import Record
+from inspect3d.report.maps import cloud_polydata, map_polydata
+from inspect3d.report.names import stems
+from inspect3d.report.page import page
+from inspect3d.report.pictures import draw_pictures
+from inspect3d.report.results import as_json, results
+
+
+def write_report(
+    record: Record, folder: Path, progress: Progress | None = None, moment: datetime | None = None
+) -> None:
+    """Write results.json, the maps and clouds (.vtp), the pictures and report.html.
+
+    Parameters
+    ----------
+    record : the finished inspection
+    folder : where everything goes; exists, and is put in its final place by the caller
+    progress : told how far the report is
+    moment : the date on the report; default: now
+    """
+    progress = progress or Progress()
+    files = stems(part.name for part in record.parts)
+    values = results(record, files)
+    (folder / "results.json").write_text(as_json(values), encoding="utf-8")
+    for part in record.parts:
+        if not part.status.has_map or part.deviation is None:
+            continue
+        map_polydata(record.nominal.mesh, part).save(files[part.name].map_file(folder))
+        if part.points_cad is not None and part.point_deviation is not None:
+            cloud_polydata(part).save(files[part.name].cloud_file(folder))
+    pictures = folder / "pictures"
+    pictures.mkdir(exist_ok=True)
+    shown = draw_pictures(record, pictures, files, progress)
+    html = page(record, values, shown, pictures, moment or datetime.now().astimezone())
+    (folder / "report.html").write_text(html, encoding="utf-8")
