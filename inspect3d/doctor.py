@@ -8,7 +8,6 @@ import subprocess
 import sys
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
-from ctypes import CDLL
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import PackageNotFoundError, requires, version
@@ -17,7 +16,7 @@ from pathlib import Path
 import inspect3d
 from inspect3d.outcome import InspectionError
 from inspect3d.registry import GROUP, method, method_names
-from inspect3d.system import LIBRARIES
+from inspect3d.system import LIBRARIES, missing_libraries
 
 PATIENCE = 120.0
 """Seconds a trial may take."""
@@ -70,7 +69,7 @@ def examine() -> list[Finding]:
     trials += [partial(_tried, "off-screen rendering", _RENDER), partial(_tried, "numba's cache", _CACHE)]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         tried = [waiting.result() for waiting in [pool.submit(trial) for trial in trials]]
-    libraries = map(_library, LIBRARIES) if sys.platform == "linux" else ()
+    libraries = _libraries() if sys.platform == "linux" else []
     return [_python(), *tried, *libraries, *_methods(), _cores()]
 
 
@@ -107,12 +106,12 @@ def _python() -> Finding:
     return Finding("Python", (3, 11) <= release < (3, 14), f"{sys.version.split()[0]}; 3.11 to 3.13 are supported")
 
 
-def _library(name: str) -> Finding:
-    try:
-        CDLL(name)
-    except OSError:
-        return Finding(name, False, f"missing: install it with `sudo apt-get install {LIBRARIES[name]}`")
-    return Finding(name, True, "found")
+def _libraries() -> list[Finding]:
+    missing = missing_libraries()
+    advice = {
+        library: f"missing: install it with `sudo apt-get install {package}`" for library, package in missing.items()
+    }
+    return [Finding(library, library not in missing, advice.get(library, "found")) for library in LIBRARIES]
 
 
 def _methods() -> list[Finding]:

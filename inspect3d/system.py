@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from ctypes import CDLL, RTLD_GLOBAL
 from importlib import import_module
 from types import ModuleType
@@ -52,6 +53,19 @@ def import_open3d() -> ModuleType:
     open3d = imported("open3d")
     open3d.utility.set_verbosity_level(open3d.utility.VerbosityLevel.Error)
     return open3d
+
+
+def missing_libraries() -> dict[str, str]:
+    """Return the shared libraries this machine lacks, with the packages they come in; Linux only."""
+    return {library: LIBRARIES[library] for library in LIBRARIES if sys.platform == "linux" and not _loads(library)}
+
+
+def _loads(library: str) -> bool:
+    try:
+        CDLL(library)
+    except OSError:
+        return False
+    return True
 
 
 def import_words(error: ImportError) -> str:
