@@ -1,0 +1,117 @@
+"""PLY files: ascii and binary, meshes, clouds and range grids."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from inspect3d.arrays import Floats, Integers
+from inspect3d.files.content import Content
+from inspect3d.files.found import Found
+from inspect3d.files.numbers import numbers
+from inspect3d.files.ply_header import Element, read_ply_header
+from inspect3d.files.ply_tape import AsciiTape, BinaryTape, Tape
+
+_CUT = "It was cut short, or its header is wrong: export or copy it again."
+_NO_LISTS = (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
+
+
+def read_ply(content: Content) -> Found:
+    """Read vertices, their normals, and faces; other elements are walked over, so that a file cut short is noticed.
+
+    Faces are the lists `vertex_indices` (or `vertex_index`) of the element `face`.
+    """
+    header = read_ply_header(content)
+    tape: Tape = BinaryTape(content.data, header.order, header.length)
+    if not header.order:
+        tape = AsciiTape(numbers(content, content.data[header.length :]))
+    tables = {element.name: _table(content, element, tape) for element in header.elements}
+    vertex, face = tables.get("vertex", {}), tables.get("face", {})
+    if not {"x", "y", "z"} <= {name for name, column in vertex.items() if not isinstance(column, tuple)}:
+        raise content.refused("has no element `vertex` with the properties x, y and z")
+    if tape.left() and not header.order:
+        raise content.refused(f"has {tape.left()} numbers more than its header declares")
+    remarks = (f"{content.path.name}: {tape.left()} bytes after the last element were ignored.",) if tape.left() else ()
+    normals = _columns(vertex, "nx", "ny", "nz") if {"nx", "ny", "nz"} <= vertex.keys() else None
+    lists = face.get("vertex_indices", face.get("vertex_index", _NO_LISTS))
+    return Found(_columns(vertex, "x", "y", "z"), normals, *lists, remarks=remarks)
+
+
+def _columns(table: dict[str, Any], *names: str) -> Floats:
+    return np.column_stack([np.asarray(table[name], dtype=np.float64) for name in names])
+
+
+def _table(content: Content, element: Element, tape: Tape) -> dict[str, Any]:
+    """Take an element from the tape: a column is an array, or (numbers, lengths) where it holds lists."""
+    least = element.rows * sum(tape.least(column) for column in element.properties)
+    try:
+        if least > tape.left():
+            raise EOFError
+        start = tape.position
+        table = _alike(element, tape) if element.rows else _row_by_row(element, tape)
+        if table is None:
+            tape.position = start
+            table = _row_by_row(element, tape)
+    except EOFError as error:
+        raise content.refused(f"ends before the {element.rows} rows of `{element.name}` it declares", _CUT) from error
+    except _BadLength as error:
+        raise content.refused(f"has a list of {error} numbers in the element `{element.name}`", _CUT) from error
+    return table
+
+
+def _alike(element: Element, tape: Tape) -> dict[str, Any] | None:
+    """Take all rows at once, if the lists in them are as long as those in the first; None if they are not."""
+    start = tape.position
+    lengths = []
+    for column in element.properties:
+        lengths.append(_length(tape, column.count) if column.count else 1)
+        tape.take(column.type, lengths[-1])
+    tape.position = start
+    try:
+        columns = iter(tape.rows(element, lengths))
+    except EOFError:
+        return None
+    table: dict[str, Any] = {}
+    for column, length in zip(element.properties, lengths, strict=True):
+        if column.count:
+            if not (next(columns) == length).all():
+                return None
+            values = _indices(next(columns).ravel())
+            table[column.name] = values, np.full(element.rows, length, dtype=np.int64)
+        else:
+            table[column.name] = next(columns)
+    return table
+
+
+def _row_by_row(element: Element, tape: Tape) -> dict[str, Any]:
+    values: dict[str, list[float]] = {column.name: [] for column in element.properties}
+    lengths: dict[str, list[int]] = {column.name: [] for column in element.properties}
+    for _ in range(element.rows):
+        for column in element.properties:
+            length = _length(tape, column.count) if column.count else 1
+            values[column.name] += tape.take(column.type, length)
+            lengths[column.name].append(length)
+    return {
+        column.name: (_indices(np.array(values[column.name])), np.array(lengths[column.name], dtype=np.int64))
+        if column.count
+        else np.array(values[column.name])
+        for column in element.properties
+    }
+
+
+def _length(tape: Tape, kind: str) -> int:
+    (length,) = tape.take(kind, 1)
+    if length != int(length) or length < 0:
+        raise _BadLength(f"{length:g}")
+    return int(length)
+
+
+def _indices(values: Any) -> Integers:
+    """Return whole numbers; what is none becomes -1, which no vertex has."""
+    whole = np.isfinite(values) & (np.abs(values) < 2**62) & (values == np.floor(values))
+    return np.where(whole, values, -1).astype(np.int64)
+
+
+class _BadLength(ValueError):
+    """A length of a list that is no count."""
