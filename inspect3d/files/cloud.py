@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -95,7 +96,7 @@ def _cleaned(content: Content, found: Found) -> CloudFile:
         normals = unit(np.nan_to_num(found.normals[finite], nan=0.0, posinf=0.0, neginf=0.0))
         normals = normals if normals.any() else None
     edges = np.cumsum([0, *found.parts])
-    parts = tuple(int(np.count_nonzero(finite[a:b])) for a, b in zip(edges[:-1], edges[1:], strict=True))
+    parts = tuple(int(np.count_nonzero(finite[a:b])) for a, b in pairwise(edges))
     return CloudFile(points, normals, parts or (len(points),), found.units, tuple(remarks))
 
 

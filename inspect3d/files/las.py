@@ -16,6 +16,7 @@ _GEO_KEYS, _WKT = 34735, 2112
 _MODEL, _GEOGRAPHIC, _LINEAR_UNIT = 1024, 2, 3076
 _UNITS = {9001: "m", 9002: "ft", 9003: "US survey ft"}
 _WKT_UNIT = re.compile(r'(?:LENGTH)?UNIT\s*\[\s*"([^"]*)"\s*,\s*([0-9.eE+-]+)')
+_ANGLES = ("DEG", "RAD", "GRAD")
 _DEGREES = "Project it to coordinates in metres first, for example with PDAL (filters.reprojection)."
 
 
@@ -55,12 +56,11 @@ def _reference(header: Any) -> tuple[str | None, bool]:
     """Return the unit of the coordinate reference system, and whether it is one of degrees."""
     records = [*header.vlrs, *(header.evlrs or [])]
     for record in records:
-        if record.record_id == _WKT:
-            text = getattr(record, "string", "")
-            if text.lstrip().upper().startswith(("GEOGCS", "GEOGCRS", "GEODCRS")):
-                return None, True
-            units = [float(unit[2]) for unit in _WKT_UNIT.finditer(text) if "deg" not in unit[1].lower()]
-            return _named(units[-1]) if units else None, False
+        text = getattr(record, "string", "").upper()
+        if record.record_id == _WKT and text.strip("\0 "):
+            projected = "PROJC" in text or "GEOCCS" in text
+            units = [float(unit[2]) for unit in _WKT_UNIT.finditer(text) if not unit[1].startswith(_ANGLES)]
+            return (_named(units[0]) if units else None), "GEOG" in text and not projected
         if record.record_id == _GEO_KEYS:
             keys = {key.id: key.value_offset for key in record.geo_keys}
             return _UNITS.get(keys.get(_LINEAR_UNIT)), keys.get(_MODEL) == _GEOGRAPHIC

@@ -10,8 +10,9 @@ from inspect3d.arrays import Floats, Integers
 from inspect3d.files.content import Content
 from inspect3d.files.found import Found
 from inspect3d.files.numbers import numbers
-from inspect3d.files.ply_header import Element, read_ply_header
+from inspect3d.files.ply_header import Element, PlyHeader, read_ply_header
 from inspect3d.files.ply_tape import AsciiTape, BinaryTape, Tape
+from inspect3d.outcome import InputError
 
 _CUT = "It was cut short, or its header is wrong: export or copy it again."
 _NO_LISTS = (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
@@ -23,16 +24,50 @@ def read_ply(content: Content) -> Found:
     Faces are the lists `vertex_indices` (or `vertex_index`) of the element `face`.
     """
     header = read_ply_header(content)
-    tape: Tape = BinaryTape(content.data, header.order, header.length)
     if not header.order:
-        tape = AsciiTape(numbers(content, content.data[header.length :]))
+        return _ascii(content, header)
+    tape = BinaryTape(content.data, header.order, header.length)
     tables = {element.name: _table(content, element, tape) for element in header.elements}
+    remarks = (f"{content.path.name}: {tape.left()} bytes after the last element were ignored.",) if tape.left() else ()
+    return _found(content, tables, remarks)
+
+
+def _ascii(content: Content, header: PlyHeader) -> Found:
+    """Read the stream of numbers; where it does not fit the header, but each row has its line, the lines."""
+    text = content.data[header.length :]
+    try:
+        return _from_numbers(content, header, text, ())
+    except InputError:
+        lines = [line.split() for line in text.splitlines() if line.strip()]
+        rows = [element for element in header.elements for _ in range(min(element.rows, len(lines) + 1))]
+        if len(rows) != len(lines):
+            raise
+        trimmed = b"\n".join(b" ".join(_declared(row, line)) for row, line in zip(rows, lines, strict=True))
+        surplus = f"{content.path.name}: numbers at the end of rows that its header does not declare were ignored."
+        return _from_numbers(content, header, trimmed, (surplus,))
+
+
+def _declared(element: Element, words: list[bytes]) -> list[bytes]:
+    """Return the words of a row that the header declares."""
+    end = 0
+    for column in element.properties:
+        counted = column.count and end < len(words) and words[end].isdigit()
+        end += 1 + int(words[end]) if counted else 1
+    return words[:end]
+
+
+def _from_numbers(content: Content, header: PlyHeader, text: bytes, remarks: tuple[str, ...]) -> Found:
+    tape = AsciiTape(numbers(content, text))
+    tables = {element.name: _table(content, element, tape) for element in header.elements}
+    if tape.left():
+        raise content.refused(f"has {tape.left()} numbers more than its header declares")
+    return _found(content, tables, remarks)
+
+
+def _found(content: Content, tables: dict[str, dict[str, Any]], remarks: tuple[str, ...]) -> Found:
     vertex, face = tables.get("vertex", {}), tables.get("face", {})
     if not {"x", "y", "z"} <= {name for name, column in vertex.items() if not isinstance(column, tuple)}:
         raise content.refused("has no element `vertex` with the properties x, y and z")
-    if tape.left() and not header.order:
-        raise content.refused(f"has {tape.left()} numbers more than its header declares")
-    remarks = (f"{content.path.name}: {tape.left()} bytes after the last element were ignored.",) if tape.left() else ()
     normals = _columns(vertex, "nx", "ny", "nz") if {"nx", "ny", "nz"} <= vertex.keys() else None
     lists = face.get("vertex_indices", face.get("vertex_index", _NO_LISTS))
     return Found(_columns(vertex, "x", "y", "z"), normals, *lists, remarks=remarks)

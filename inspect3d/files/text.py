@@ -10,7 +10,7 @@ from inspect3d.arrays import Floats
 from inspect3d.files.content import Content
 from inspect3d.files.found import Found
 from inspect3d.files.table import table
-from inspect3d.files.text_layout import TextLayout, text_layout
+from inspect3d.files.text_layout import text_layout
 
 _COMMENTS = re.compile(rb"^[ \t]*(#|//|%|!)[^\n]*$", re.MULTILINE)
 _COUNT = re.compile(rb"\s*(\d+)[ \t]*\r?(\n|$)")
@@ -44,7 +44,7 @@ def read_text(content: Content) -> Found:
         text = text[end:]
         count = _COUNT.match(text)
     if text.strip():
-        raise content.refused(f"goes on after the {wanted} points it declares, in line {line}", _CUT)
+        raise content.refused(f"goes on after the {wanted} points it declares, in line {line}", "Correct the count.")
     return _joined(blocks)
 
 
@@ -54,25 +54,23 @@ def _rows(content: Content, text: bytes, first_line: int) -> Found:
     if _COMMENTS.search(text):
         text = _COMMENTS.sub(b"", text)
     text = text.replace(b'"', b"")
-    if layout.decimal_comma:
+    if layout.delimiter != ",":
         text = text.replace(b",", b".")
-    columns = tuple(layout.places[name] for name in _NAMED if name in layout.places)
-    if not layout.places:
-        _require_three(content, layout)
-        columns = tuple(range(layout.width)) if layout.delimiter else ()
-    rows = table(content, text, first_line + layout.skipped, layout.delimiter, columns or None)
+    if layout.width < 3:
+        raise content.refused(f"has {layout.width} columns where x, y and z are expected", "Export it with x y z.")
+    wanted = tuple(layout.places[name] for name in _NAMED if name in layout.places) or tuple(range(layout.width))
+    line = first_line + layout.skipped
+    if layout.numeric:
+        rows = table(content, text, line, layout.delimiter)[:, wanted]
+    else:
+        rows = table(content, text, line, layout.delimiter, wanted)
     if layout.places:
-        return Found(rows[:, :3], rows[:, 3:6] if {"nx", "ny", "nz"} <= layout.places.keys() else None)
+        return Found(rows[:, :3].copy(), rows[:, 3:6].copy() if rows.shape[1] == 6 else None)
     remarks: tuple[str, ...] = ()
     if rows.shape[1] > 3 and len(rows) > 3 and _counts(rows[:, 0]):
         rows = rows[:, 1:]
         remarks = (f"{content.path.name}: the first column counts the rows and was not taken for x.",)
     return Found(rows[:, :3].copy(), _normals(rows), remarks=remarks)
-
-
-def _require_three(content: Content, layout: TextLayout) -> None:
-    if layout.width < 3:
-        raise content.refused(f"has {layout.width} columns where x, y and z are expected", "Export it with x y z.")
 
 
 def _counts(column: Floats) -> bool:

@@ -10,7 +10,7 @@ from inspect3d.files.content import Content
 
 _COMMENT = re.compile(r"(#|//|%|!)+\s*")
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?|[-+]?(nan|inf|infinity)", re.IGNORECASE)
-_WITH_COMMA = re.compile(r"[-+]?\d+(,\d*)?(e[-+]?\d+)?", re.IGNORECASE)
+_INNER_COMMA = re.compile(r"[^,]*,[^,]+|[^,]+")
 _UNIT = re.compile(r"\s*[\[(][^\])]*[\])]|_(mm|cm|m|um|in|inch)\b", re.IGNORECASE)
 _NAMES = {
     "x": ("x", "xcoord", "coordx", "xcoordinate", "points0", "points:0", "px", "posx", "positionx", "easting"),
@@ -29,17 +29,17 @@ class TextLayout:
     Parameters
     ----------
     delimiter : one character; None for white space
-    decimal_comma : a comma stands for the decimal point
     skipped : lines before the first row
     width : columns of the first row
     places : the columns of x, y, z and perhaps nx, ny, nz, from 0; empty where the file does not name its columns
+    numeric : all columns are numbers, and no delimiter ends a row
     """
 
     delimiter: str | None
-    decimal_comma: bool
     skipped: int
     width: int
     places: dict[str, int]
+    numeric: bool
 
 
 def text_layout(content: Content, lines: Iterable[bytes]) -> TextLayout:
@@ -62,9 +62,10 @@ def text_layout(content: Content, lines: Iterable[bytes]) -> TextLayout:
             names = _names(line[comment.end() :]) or names
         if comment or not line:
             continue
-        delimiter, decimal_comma = _delimiter(line)
+        delimiter = _delimiter(line)
         words = _words(line, delimiter)
-        if not titled and not all((_WITH_COMMA if decimal_comma else _NUMBER).fullmatch(word) for word in words):
+        numeric = all(_NUMBER.fullmatch(word if delimiter == "," else word.replace(",", ".")) for word in words)
+        if not titled and not numeric:
             titled, names = True, _names(line)
             if names:
                 continue
@@ -75,22 +76,19 @@ def text_layout(content: Content, lines: Iterable[bytes]) -> TextLayout:
         if titled and len(names) != len(words):
             raise content.refused(f"names {len(names)} columns and has {len(words)} in line {skipped + 1}")
         places = _places(names) if len(names) == len(words) else {}
-        return TextLayout(delimiter, decimal_comma, skipped, len(words), places)
+        whole = numeric and len(words) == len(line.split(delimiter))
+        return TextLayout(delimiter, skipped, len(words), places, whole)
     raise content.refused("has no rows of numbers", "Points are rows of numbers x y z.")
 
 
-def _delimiter(line: str) -> tuple[str | None, bool]:
-    """Return what parts the columns of a row, and whether a comma is the decimal point."""
+def _delimiter(line: str) -> str | None:
+    """Return what parts the columns of a row; commas inside of words that white space parts are decimal points."""
     if ";" in line:
-        return ";", "," in line
+        return ";"
     words = line.split()
-    tabs = "\t" if "\t" in line and all(len(field.split()) <= 1 for field in line.split("\t")) else None
-    if "," not in line:
-        return tabs, False
-    if len(words) >= 3 and all(_WITH_COMMA.fullmatch(word) for word in words) and not line.endswith(","):
-        whole = sum("," not in word or word.endswith(",") for word in words)
-        return (tabs, True) if whole < len(words) - 1 else (",", False)
-    return ",", False
+    if "," in line and not (len(words) >= 3 and all(_INNER_COMMA.fullmatch(word) for word in words)):
+        return ","
+    return "\t" if "\t" in line and all(len(field.split()) <= 1 for field in line.split("\t")) else None
 
 
 def _words(line: str, delimiter: str | None) -> list[str]:
