@@ -86,6 +86,23 @@ class PartSurface:
             points[here], normals[here] = patch(parameters[here])
         return points, normals
 
+    def seen_from(self, origins: Floats, direction: Floats, reach: float) -> tuple[Floats, Floats]:
+        """Return the points (k, 3) mm of the surface that parallel rays meet first, and their outward normals.
+
+        Rays that meet nothing leave no point. A point is on the exact surface, and at most `chord_inside` off the place
+        where its ray meets the triangles.
+
+        Parameters
+        ----------
+        origins : (n, 3) mm
+        direction : (3,), unit, of all rays
+        reach : mm, length of the rays
+        """
+        hits = self.triangulation.first_hit(origins, direction, reach)
+        hit = hits.triangle >= 0
+        triangle = hits.triangle[hit]
+        return self.at(triangle, self._weights(triangle, origins[hit] + hits.distance[hit, None] * direction))
+
     def sample(self, count: int, random: np.random.Generator) -> tuple[Floats, Floats]:
         """Return points (count, 3) mm spread uniformly at random over the surface, and their outward normals."""
         cumulated = np.cumsum(self.areas)
@@ -94,3 +111,12 @@ class PartSurface:
         root, share = np.sqrt(random.random(count)), random.random(count)
         weights = np.column_stack([1.0 - root, root * (1.0 - share), root * share])
         return self.at(triangle, weights)
+
+    def _weights(self, triangle: Integers, points: Floats) -> Floats:
+        """Return barycentric weights (n, 3), none negative, of points (n, 3) mm in the planes of their triangles."""
+        corners = self.vertices[self.triangles[triangle]]
+        facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        to_point = points[:, None] - corners
+        opposite = np.cross(np.roll(to_point, -1, axis=1), np.roll(to_point, -2, axis=1))
+        shares = np.maximum(np.einsum("nki,ni->nk", opposite, facing), 0.0)
+        return shares / shares.sum(axis=1, keepdims=True)
