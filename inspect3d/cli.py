@@ -35,16 +35,21 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")
     try:
         app(arguments)
-    except (KeyboardInterrupt, SystemExit) as end:
-        if isinstance(end, SystemExit) and end.code != INTERRUPTED:
-            raise
-        typer.echo("Interrupted; nothing was left behind, and earlier results are untouched.", err=True)
-        sys.exit(INTERRUPTED)
-    except Exception as error:
-        if debug:
+    except BaseException as error:
+        if _interrupted(error):
+            typer.echo("Interrupted; earlier results are untouched.", err=True)
+            sys.exit(INTERRUPTED)
+        if debug or not isinstance(error, Exception):
             raise
         typer.echo(_sentence(error), err=True)
         sys.exit(_exit_status(error))
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    """Tell whether Ctrl-C was the reason: libraries, while they load, turn it into errors of their own."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _sentence(error: Exception) -> str:
@@ -52,6 +57,10 @@ def _sentence(error: Exception) -> str:
         return str(error)
     if isinstance(error, OSError):
         return f"{error.filename or 'A file'}: {error.strerror or error}."
+    if isinstance(error, ImportError):
+        from inspect3d.system import import_words
+
+        return import_words(error)
     if isinstance(error, MemoryError):
         return "There is not enough memory; a larger element_size or fewer points need less."
     return f"inspect3d made a mistake of its own ({type(error).__name__}: {error}); please report it with --debug."
@@ -60,7 +69,7 @@ def _sentence(error: Exception) -> str:
 def _exit_status(error: Exception) -> int:
     if isinstance(error, InputError | OSError):
         return WRONG_INPUT
-    return UNANSWERED if isinstance(error, InspectionError | MemoryError) else BROKEN
+    return UNANSWERED if isinstance(error, InspectionError | MemoryError | ImportError) else BROKEN
 
 
 def _show_version(asked: bool) -> None:
@@ -138,13 +147,13 @@ def screenshot(
 
 @app.command()
 def virtual(
-    name: Annotated[str, typer.Argument(help="Which one; such as bracket.")],
+    name: Annotated[str, typer.Argument(help="bracket, freeform or milled.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the data set.")],
-    seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")] = 0,
 ) -> None:
     """Make a data set with a known truth: CAD, simulated measurement, recipe."""
     from inspect3d.terminal import terminal
-    from inspect3d.virtual.make_dataset import make_dataset
+    from inspect3d.virtual.datasets import make_dataset
 
     with terminal(sys.stderr) as progress, progress.stage(f"making {name}"):
         make_dataset(name, out, seed)

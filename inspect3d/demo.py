@@ -20,7 +20,7 @@ def demo_recipe() -> Iterator[Path]:
     if recipe.exists():
         yield recipe
         return
-    from inspect3d.virtual.make_dataset import make_dataset
+    from inspect3d.virtual.datasets import make_dataset
 
     with TemporaryDirectory(prefix="inspect3d-demo-") as folder:
         make_dataset("bracket", Path(folder))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import MISSING, dataclass, fields
 from inspect import getdoc
-from typing import Any
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 _PARAMETER = re.compile(r"^(\w+(?:, \w+)*) : (.*(?:\n[ ]+.*)*)", re.MULTILINE)
 """An entry of a NumPy-style docstring: names, a colon, and the text with its indented lines."""
@@ -36,15 +36,18 @@ def settings_of(plugin: type) -> tuple[Setting, ...]:
         for names, text in _PARAMETER.findall(getdoc(plugin) or "")
         for name in names.split(", ")
     }
+    hints = get_type_hints(plugin)
     return tuple(
-        Setting(field.name, _kind(field.type), _default(field), meanings.get(field.name, ""))
+        Setting(field.name, _kind(hints[field.name]), _default(field), meanings.get(field.name, ""))
         for field in fields(plugin)
         if field.init
     )
 
 
-def _kind(annotation: Any) -> str:
-    return annotation if isinstance(annotation, str) else getattr(annotation, "__name__", str(annotation))
+def _kind(hint: Any) -> str:
+    if get_origin(hint) is Literal:
+        return " | ".join(map(repr, get_args(hint)))
+    return hint.__name__ if isinstance(hint, type) and not get_args(hint) else str(hint)
 
 
 def _default(field: Any) -> str:
