@@ -39,23 +39,23 @@ class Canvas:
         return min(self.width / 1600, self.height / 1200)
 
     @cached_property
-    def axes(self) -> Axes:
-        """Return the axes in pixels."""
+    def figure(self) -> Figure:
+        """Return the sheet as a matplotlib figure."""
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(self.width / 100, self.height / 100), dpi=100, facecolor="white")
         FigureCanvasAgg(figure)
-        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        return figure
+
+    @cached_property
+    def axes(self) -> Axes:
+        """Return the axes in pixels."""
+        axes = self.figure.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.set_axis_off()
         axes.set_xlim(0, self.width)
         axes.set_ylim(self.height, 0)
         return axes
-
-    @property
-    def figure(self) -> Figure:
-        """Return the sheet as a matplotlib figure."""
-        return self.axes.get_figure(root=True)
 
     def text(self, x: float, y: float, words: str, size: float, **style: Any) -> None:
         """Write words as they are, whatever characters they hold; size in px of a 1600 x 1200 sheet."""

@@ -20,6 +20,7 @@ def draw_colour_bar(canvas: Canvas, layout: Layout, scale: ColourScale, toleranc
     heading = f"{scale.title}, {scale.unit}" if scale.unit else scale.title
     canvas.text(left - 28 * u, layout.top + 14 * u, heading, 23, weight="bold")
     if scale.classes:
+        left = layout.right + 32 * u
         _draw_classes(canvas, scale, (left, width, top, bottom))
     else:
         _draw_values(canvas, scale, (left, width, top, bottom), tolerance)
@@ -38,7 +39,7 @@ def ticks(limits: Interval) -> Floats:
 
 
 def tick_words(values: Floats) -> list[str]:
-    """Return the values with the same number of decimals, as many as tell them apart, and a sign where some have one."""
+    """Return the values with as many decimals as tell them apart, and with a sign where one of them is negative."""
     step = float(np.diff(values).min()) if len(values) > 1 else max(abs(float(values[0])), 1.0)
     places = next(k for k in range(13) if k == 12 or abs(round(step, k) - step) < 1e-6 * step)
     return [number(float(value), places, sign=bool(values.min() < 0)) for value in values]

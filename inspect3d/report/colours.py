@@ -12,6 +12,8 @@ from inspect3d.deviate.statistics import percentiles
 from inspect3d.recipe import Interval
 
 UNMEASURED = (158, 161, 166)
+BACK = (111, 118, 131)
+"""The inside of an open surface."""
 BANDS = ("too little", "undecided, low", "conform", "undecided, high", "too much")
 BAND_COLOURS = ((44, 123, 182), (171, 217, 233), (255, 255, 191), (253, 174, 97), (215, 25, 28))
 STEPS = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
@@ -62,15 +64,20 @@ def band_scale() -> ColourScale:
 
 
 def symmetric_limits(values: Floats, areas: Floats) -> Interval:
-    """Return limits about zero that hold 98 % of the area, rounded up to a value one reads off easily."""
+    """Return limits about zero, rounded up to a value one reads off easily.
+
+    They hold 99.8 % of the area, so that a local defect shows its height; but not more than three times what holds
+    95 %, so that a few blunders don't flatten the rest.
+    """
     if not len(values) or not areas.sum() > 0:
         return (-0.1, 0.1)
-    top = rounded_up(float(percentiles(np.abs(values), areas, 98.0)))
+    most, nearly_all = percentiles(np.abs(values), areas, (95.0, 99.8))
+    top = rounded_up(float(min(nearly_all, 3.0 * most)))
     return (-top, top)
 
 
 def rising_limits(values: Floats, areas: Floats) -> Interval:
-    """Return limits from zero that hold 98 % of the area, rounded up likewise."""
+    """Return limits from zero that hold nearly all of the area, chosen likewise."""
     return (0.0, symmetric_limits(values, areas)[1])
 
 

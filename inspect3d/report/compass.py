@@ -22,25 +22,20 @@ def draw_compass(canvas: Canvas, layout: Layout, axes: Floats, pixel: float, wor
     words : of the viewpoint
     """
     u = layout.unit
-    middle = np.array([95 * u, layout.bottom + 76 * u])
+    x, y = 95 * u, layout.bottom + 76 * u
     arm = 42 * u
-    for k in np.argsort(axes[2]):
+    for k in np.argsort(axes[2]).tolist():
         right, up, _ = axes[:, k]
         length = float(np.hypot(right, up))
         if length < 0.05:
-            canvas.axes.plot(*middle, marker="o", markersize=7 * u, color=COLOURS[k])
-            canvas.text(middle[0] - 16 * u, middle[1] + 18 * u, "xyz"[k], 22, ha="center", color=COLOURS[k])
+            canvas.axes.plot(x, y, marker="o", markersize=7 * u, color=COLOURS[k])
+            canvas.text(x - 16 * u, y + 18 * u, "xyz"[k], 22, ha="center", color=COLOURS[k])
             continue
-        tip = middle + arm * np.array([right, -up])
-        canvas.axes.annotate(
-            "",
-            tip,
-            middle,
-            arrowprops={"arrowstyle": "-|>", "color": COLOURS[k], "lw": 2.2 * u, "mutation_scale": 13 * u},
-        )
-        letter = middle + (arm + 15 * u / max(length, 0.3)) * np.array([right, -up])
-        canvas.text(*letter, "xyz"[k], 22, ha="center", color=COLOURS[k])
-    left, y = 220 * u, layout.bottom + 75 * u
+        arrow = {"arrowstyle": "-|>", "color": COLOURS[k], "lw": 2.2 * u, "mutation_scale": 13 * u}
+        canvas.axes.annotate("", (x + arm * right, y - arm * up), (x, y), arrowprops=arrow)
+        beyond = arm + 15 * u / max(length, 0.3)
+        canvas.text(x + beyond * right, y - beyond * up, "xyz"[k], 22, ha="center", color=COLOURS[k])
+    left = 220 * u
     length = round_length(pixel * 300 * u)
     right = left + length / pixel
     canvas.line([left, right], [y, y], width=4)

@@ -8,6 +8,7 @@ import numpy as np
 
 from inspect3d.nominal.nominal import InspectionMesh
 from inspect3d.record import MeasuredPart
+from inspect3d.report.triangulated import triangulated
 
 if TYPE_CHECKING:
     from pyvista import PolyData
@@ -24,15 +25,13 @@ def map_polydata(mesh: InspectionMesh, part: MeasuredPart) -> PolyData:
     ValueError
         The measurement ended without a map, or its map belongs to another mesh.
     """
-    from pyvista import PolyData
-
     if part.deviation is None:
         raise ValueError(f"{part.name} has no map")
     if len(part.deviation.value) != len(mesh):
         raise ValueError(f"the map of {part.name} has {len(part.deviation.value)} values for {len(mesh)} nodes")
     observed = part.deviation.observed
     verdict = np.zeros(len(mesh)) if part.verdict is None else np.where(observed, part.verdict, 0)
-    polydata = PolyData.from_regular_faces(np.array(mesh.nodes), np.array(mesh.triangles))
+    polydata = triangulated(mesh.nodes, mesh.triangles)
     polydata.point_data["deviation"] = np.where(observed, part.deviation.value, np.nan)
     polydata.point_data["sigma"] = np.where(observed, part.deviation.sigma, np.nan)
     polydata.point_data["observed"] = observed.astype(np.uint8)

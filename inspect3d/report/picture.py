@@ -66,7 +66,7 @@ class Picture:
         self.caption.write(canvas)
         if self.scale is not None:
             draw_colour_bar(canvas, layout, self.scale, self.tolerance)
-        draw_compass(canvas, layout, drawing.axes, drawing.pixel, f"seen from {viewpoint.name}")
+        draw_compass(canvas, layout, drawing.axes, drawing.pixel, f"seen from {viewpoint.words}")
         nodes = [reading.node for reading in self.flagged if reading.node is not None]
         if nodes:
             seen = drawing.sees(self.mesh.nodes[nodes], self.mesh.normals[nodes])

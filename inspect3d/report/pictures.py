@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,7 +23,6 @@ from inspect3d.report.colours import (
 from inspect3d.report.digits import COVERAGE, decimals, number
 from inspect3d.report.histogram import draw_histogram
 from inspect3d.report.layout import Layout
-from inspect3d.report.names import Stem
 from inspect3d.report.picture import Caption, Picture
 from inspect3d.report.reading import readings
 from inspect3d.report.scene import scene
@@ -36,24 +34,22 @@ JUDGED = 2
 """Pictures of the tolerance bands: the first of the viewpoints."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shown:
-    """A picture in the report: its file in the folder `pictures`, and what it shows."""
+    """A picture in the report: its file in the folder `pictures`, what it shows, and from where."""
 
     file: str
     words: str
+    viewpoint: Viewpoint | None = None
 
 
-def draw_pictures(
-    record: Record, folder: Path, stems: Mapping[str, Stem], progress: Progress
-) -> dict[str, tuple[Shown, ...]]:
+def draw_pictures(record: Record, folder: Path, progress: Progress) -> dict[str, tuple[Shown, ...]]:
     """Write all pictures as PNG.
 
     Parameters
     ----------
     record : the inspection
     folder : where they go; exists
-    stems : how the files of each measurement begin
     progress : told how far it is
 
     Returns
@@ -61,11 +57,11 @@ def draw_pictures(
     for each measurement its pictures in the report's order, and under "" the one of the part
     """
     views = Views.of(record.nominal.mesh)
-    shown = {"": (_draw_part(record, folder, views),)}
+    shown: dict[str, tuple[Shown, ...]] = {"": (_draw_part(record, folder, views),)}
     with_map = [part for part in record.parts if part.status.has_map and part.deviation is not None]
     for k, part in enumerate(with_map):
         progress.update((k + 0.3) / (len(with_map) + 0.3))
-        shown[part.name] = tuple(_draw_measurement(record, part, folder, stems[part.name], views))
+        shown[part.name] = tuple(_draw_measurement(record, part, folder, views))
     progress.update(1.0)
     return shown
 
@@ -97,10 +93,10 @@ def _draw_part(record: Record, folder: Path, views: Views) -> Shown:
     picture = Picture(mesh, Layout(*SIZE), caption)
     with scene(mesh.nodes, mesh.triangles, np.full(len(mesh), np.nan), None, picture.layout.window) as window:
         picture.taken(window, viewpoint).save(folder / "part.png")
-    return Shown("part.png", "The part as designed")
+    return Shown("part.png", "The part as designed", viewpoint)
 
 
-def _draw_measurement(record: Record, part: MeasuredPart, folder: Path, stem: Stem, views: Views) -> list[Shown]:
+def _draw_measurement(record: Record, part: MeasuredPart, folder: Path, views: Views) -> list[Shown]:
     mesh, table = record.nominal.mesh, record.recipe.part
     if part.deviation is None:
         return []
@@ -119,9 +115,9 @@ def _draw_measurement(record: Record, part: MeasuredPart, folder: Path, stem: St
         shown = []
         with scene(mesh.nodes, mesh.triangles, values, scale, layout.window) as window:
             for k, viewpoint in enumerate(views, start=1):
-                file = stem.picture(f"{field}_{k}")
+                file = f"{part.name}_{field}_{k}.png"
                 picture.taken(window, viewpoint).save(folder / file)
-                shown.append(Shown(file, f"{words}, seen from {viewpoint.name}"))
+                shown.append(Shown(file, f"{words}, seen from {viewpoint.words}", viewpoint))
         return shown
 
     scale = map_scale(record, part)
@@ -134,7 +130,7 @@ def _draw_measurement(record: Record, part: MeasuredPart, folder: Path, stem: St
     values, areas = _observed(record, part)
     if areas.sum() > 0:
         caption = Caption(table.name, f"{part.name}: how the measured area is spread over the deviations", figures)
-        file = stem.picture("histogram")
+        file = f"{part.name}_histogram.png"
         draw_histogram(folder / file, values, areas, scale, caption, table.tolerance, Layout(1600, 900))
         shown.append(Shown(file, "Histogram of the deviations"))
     return shown
@@ -159,5 +155,5 @@ def _figures(record: Record, part: MeasuredPart) -> str:
     return (
         f"mean {number(figures.mean, places, True)} · std {number(figures.std, places)} · "
         f"min {number(figures.min, places, True)} · max {number(figures.max, places, True)} mm · "
-        f"U (k = 2) {number(expanded, places)} mm · {number(share, 1)} % of the area measured"
+        f"median U (k = 2) {number(expanded, places)} mm · {number(share, 1)} % of the area measured"
     )

@@ -14,7 +14,6 @@ from inspect3d.deviate.statistics import Statistics, percentiles
 from inspect3d.nominal.nominal import InspectionMesh
 from inspect3d.record import MeasuredPart, Record
 from inspect3d.register.alignment import Alignment, Candidate
-from inspect3d.report.names import Stem
 from inspect3d.report.reading import Reading, readings
 
 SCHEMA = 1
@@ -22,7 +21,7 @@ FIGURES = ("mean", "std", "rms", "min", "max", "p05", "p50", "p95")
 VERDICTS = ("conform", "undecided", "nonconform")
 
 
-def results(record: Record, stems: Mapping[str, Stem]) -> dict[str, Any]:
+def results(record: Record) -> dict[str, Any]:
     """Return the inspection as plain lists, numbers and strings; lengths in mm, angles in rad, sigmas at k = 1.
 
     The figures are given in full; rounding belongs to the report. What is not known is None.
@@ -34,7 +33,7 @@ def results(record: Record, stems: Mapping[str, Stem]) -> dict[str, Any]:
         "versions": dict(record.versions),
         "inputs": [{"path": file.path, "sha256": file.sha256} for file in record.inputs],
         "warnings": list(record.warnings),
-        "measurements": {part.name: _measurement(record, mesh, part, stems[part.name]) for part in record.parts},
+        "measurements": {part.name: _measurement(record, mesh, part) for part in record.parts},
         "comparisons": [],
     }
 
@@ -78,17 +77,13 @@ def _part(record: Record) -> dict[str, Any]:
     }
 
 
-def _measurement(record: Record, mesh: InspectionMesh, part: MeasuredPart, stem: Stem) -> dict[str, Any]:
+def _measurement(record: Record, mesh: InspectionMesh, part: MeasuredPart) -> dict[str, Any]:
     has_map = part.status.has_map and part.deviation is not None
-    files = {"map": f"{stem.text}.vtp"} if has_map else {}
-    if has_map and part.points_cad is not None:
-        files["points"] = f"{stem.cloud}.vtp"
     return {
         "method": part.method,
         "provenance": part.provenance,
         "status": part.status.value,
         "reason": part.reason,
-        "files": files,
         "alignment": _alignment(part) if has_map else _no_alignment(part),
         "deviation": _deviation(mesh, part) if has_map else None,
         "verdict": verdict_shares(mesh, part) if has_map else None,

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inspect3d.arrays import Booleans, Floats, Integers
-from inspect3d.report.colours import UNMEASURED, ColourScale
+from inspect3d.report.colours import BACK, UNMEASURED, ColourScale
+from inspect3d.report.triangulated import triangulated
 from inspect3d.report.viewpoint import Viewpoint
 
 if TYPE_CHECKING:
     from pyvista import Plotter, PolyData
 
-BACK = "#6f7683"
 LINES = "#3a3f47"
 SHARP = 30.0
 """Degrees between facets from which an edge is drawn."""
@@ -85,7 +85,7 @@ class Scene:
         camera.parallel_scale = pixel * height / 2
         camera.clipping_range = (far * 0.25, far * 1.75)
         self.plotter.render()
-        image = np.ascontiguousarray(self.plotter.screenshot(return_img=True)[..., :3])
+        image = np.ascontiguousarray(np.asarray(self.plotter.screenshot(return_img=True))[..., :3])
         nearness = far + np.asarray(self.plotter.get_image_depth(fill_value=np.nan), dtype=np.float64)
         return Drawing(image, nearness, axes, centre, float(pixel))
 
@@ -105,16 +105,16 @@ def scene(
     size : width and height, px
     """
     _silence()
-    from pyvista import Plotter, PolyData
+    from pyvista import Plotter
 
-    surface = PolyData.from_regular_faces(np.array(nodes), np.array(triangles))
+    surface = triangulated(nodes, triangles)
     plotter = Plotter(off_screen=True, window_size=list(size), lighting="none")
     try:
         plotter.set_background("white")
         _light(plotter)
         shown = np.isfinite(values)
         if scale is None or not shown.any():
-            _add(plotter, _shaded(surface), color=_grey())
+            _add(plotter, _shaded(surface), color=_share(UNMEASURED))
         elif scale.classes:
             _add_classes(plotter, surface, values, scale)
         else:
@@ -134,30 +134,28 @@ def _add_field(plotter: Plotter, surface: PolyData, values: Floats, scale: Colou
     shaded = _shaded(surface, value=values)
     value, shown = np.array(shaded.point_data["value"]), np.isfinite(shaded.point_data["value"])
     shaded.point_data["shown"] = shown.astype(np.float64)
-    shaded.point_data["value"] = _filled(value, shown, shaded.regular_faces)
+    shaded.point_data["value"] = _filled(value, shown, np.asarray(shaded.regular_faces, dtype=np.int64))
     measured, rest = shaded.clip_scalar(scalars="shown", invert=False, value=0.5, both=True)
     if measured.n_cells:
         colours = ListedColormap(scale.colours / 255.0)
         _add(plotter, measured, scalars="value", cmap=colours, clim=scale.limits)
     if rest.n_cells:
-        _add(plotter, rest, color=_grey())
+        _add(plotter, rest, color=_share(UNMEASURED))
 
 
 def _add_classes(plotter: Plotter, surface: PolyData, values: Floats, scale: ColourScale) -> None:
-    from pyvista import PolyData
-
-    triangles = surface.regular_faces
+    triangles = np.asarray(surface.regular_faces, dtype=np.int64)
     points, pieces, owner = _cells_of_nodes(np.asarray(surface.points), triangles)
-    shaded = _shaded(PolyData.from_regular_faces(points, pieces), node=owner.astype(np.float64), on="cell")
+    shaded = _shaded(triangulated(points, pieces), node=owner.astype(np.float64), on="cell")
     index = np.nan_to_num(values[np.asarray(shaded.cell_data["node"]).astype(np.int64)]).astype(np.int64)
     palette = np.vstack([np.array(UNMEASURED, dtype=np.uint8), scale.colours])
     shaded.cell_data["colour"] = palette[index]
     _add(plotter, shaded, scalars="colour", rgb=True, preference="cell")
 
 
-def _add(plotter: Plotter, surface: PolyData, **colours: object) -> None:
+def _add(plotter: Plotter, surface: PolyData, **colours: Any) -> None:
     """Add a surface whose normals are set; bright enough that its colours are those of the colour bar."""
-    back = {"color": BACK, "ambient": 0.4, "diffuse": 0.5}
+    back: Any = {"color": _share(BACK), "ambient": 0.4, "diffuse": 0.5}
     actor = plotter.add_mesh(
         surface, ambient=0.72, diffuse=0.34, show_scalar_bar=False, backface_params=back, **colours
     )
@@ -166,12 +164,12 @@ def _add(plotter: Plotter, surface: PolyData, **colours: object) -> None:
 
 def _cells_of_nodes(nodes: Floats, triangles: Integers) -> tuple[Floats, Integers, Integers]:
     """Return the surface in smaller triangles, six to one, and the node each belongs to."""
-    corners = nodes[triangles]
-    middles = (corners + np.roll(corners, -1, axis=1)) / 2
-    points = np.concatenate([nodes, middles.reshape(-1, 3), corners.mean(axis=1)])
     n, m = len(nodes), len(triangles)
-    middle = n + np.arange(3 * m).reshape(m, 3)
-    centre = n + 3 * m + np.arange(m)
+    edges = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)
+    first, edge = np.unique(edges[:, 0] * n + edges[:, 1], return_index=True, return_inverse=True)[1:]
+    points = np.concatenate([nodes, nodes[edges[first]].mean(axis=1), nodes[triangles].mean(axis=1)])
+    middle = n + edge.reshape(m, 3)
+    centre = n + len(first) + np.arange(m)
     pieces, owner = [], []
     for k in range(3):
         pieces.append(np.column_stack([triangles[:, k], middle[:, k], centre]))
@@ -206,15 +204,16 @@ def _shaded(surface: PolyData, on: str = "point", **fields: Floats) -> PolyData:
 def _light(plotter: Plotter) -> None:
     from pyvista import Light
 
-    for position, intensity in (((0.0, 0.0, 1.0), 0.6), ((-0.7, 0.9, 0.8), 0.55)):
+    for position, intensity in (((0.0, 0.0, 1.0), 0.75), ((-0.4, 0.8, 0.9), 0.35)):
         light = Light(light_type="camera light", intensity=intensity)
         light.position = position
         light.focal_point = (0.0, 0.0, 0.0)
         plotter.add_light(light)
 
 
-def _grey() -> tuple[float, ...]:
-    return tuple(channel / 255 for channel in UNMEASURED)
+def _share(colour: tuple[int, int, int]) -> tuple[float, float, float]:
+    red, green, blue = colour
+    return (red / 255, green / 255, blue / 255)
 
 
 def _silence() -> None:

@@ -66,6 +66,11 @@ class Viewpoint:
         return cls(f"azimuth {azimuth:g}°, elevation {elevation:g}°", direction)
 
     @property
+    def words(self) -> str:
+        """Return the name as it is printed."""
+        return self.name.replace("-", "−")
+
+    @property
     def axes(self) -> Floats:
         """Return the rows right, up and towards the eye, (3, 3); +z is up unless one looks along it, then +y."""
         straight = abs(self.direction[2]) > 0.999

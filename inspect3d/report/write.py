@@ -8,7 +8,6 @@ from pathlib import Path
 from inspect3d.progress import Progress
 from inspect3d.record import Record
 from inspect3d.report.maps import cloud_polydata, map_polydata
-from inspect3d.report.names import stems
 from inspect3d.report.page import page
 from inspect3d.report.pictures import draw_pictures
 from inspect3d.report.results import as_json, results
@@ -27,17 +26,16 @@ def write_report(
     moment : the date on the report; default: now
     """
     progress = progress or Progress()
-    files = stems(part.name for part in record.parts)
-    values = results(record, files)
+    values = results(record)
     (folder / "results.json").write_text(as_json(values), encoding="utf-8")
     for part in record.parts:
         if not part.status.has_map or part.deviation is None:
             continue
-        map_polydata(record.nominal.mesh, part).save(files[part.name].map_file(folder))
+        map_polydata(record.nominal.mesh, part).save(folder / f"{part.name}.vtp")
         if part.points_cad is not None and part.point_deviation is not None:
-            cloud_polydata(part).save(files[part.name].cloud_file(folder))
+            cloud_polydata(part).save(folder / f"{part.name}_points.vtp")
     pictures = folder / "pictures"
     pictures.mkdir(exist_ok=True)
-    shown = draw_pictures(record, pictures, files, progress)
+    shown = draw_pictures(record, pictures, progress)
     html = page(record, values, shown, pictures, moment or datetime.now().astimezone())
     (folder / "report.html").write_text(html, encoding="utf-8")

@@ -1,0 +1,91 @@
+"""Poses and their uncertainty as the report shows them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from inspect3d.outcome import Status
+from inspect3d.record import MeasuredPart
+from inspect3d.register.alignment import Alignment
+from inspect3d.report.digits import number, significant
+from inspect3d.report.results import candidates
+
+MOTIONS = ("turn about x", "turn about y", "turn about z", "shift along x", "shift along y", "shift along z")
+NEGLIGIBLE = 1e-12
+"""Standard uncertainty, rad or mm, below which a motion was held."""
+
+
+@dataclass(frozen=True)
+class PoseWords:
+    """A pose to show: its title, a sentence, and its matrix as a recipe takes it."""
+
+    title: str
+    words: str
+    matrix: str
+
+
+def poses(part: MeasuredPart) -> tuple[PoseWords, ...]:
+    """Return the poses of a measurement and, after them, the other candidates."""
+    found = []
+    if part.status.has_map:
+        for k, alignment in enumerate(part.alignments, start=1):
+            of_file = f" of file {k}" if len(part.alignments) > 1 else ""
+            found.append(
+                PoseWords(f"Pose{of_file}: CAD from measured", "", _matrix(alignment.cad_from_measured.matrix))
+            )
+    considered = candidates(part)
+    if part.status.has_map and len(considered) < 2:
+        return tuple(found)
+    for k, candidate in enumerate(considered, start=1):
+        residual = significant(candidate.residual, 3)
+        scale = f", scale {candidate.scale:.6g}" if candidate.scale != 1 else ""
+        words = f"Pose {k} of those considered, best first: robust residual {residual} mm{scale}."
+        found.append(PoseWords(f"Candidate {k}: residual {residual} mm", words, _matrix(candidate.pose.matrix)))
+    return tuple(found)
+
+
+def motions(alignment: Alignment) -> list[tuple[str, str]]:
+    """Return the six standard uncertainties of the pose; a motion without any was held."""
+    sigma = np.sqrt(np.maximum(np.diag(alignment.covariance), 0.0))
+    rows = []
+    for k, (name, size) in enumerate(zip(MOTIONS, sigma.tolist(), strict=True)):
+        figure = f"{significant(np.degrees(size), 2)}°" if k < 3 else f"{significant(1000 * size, 2)} µm"
+        rows.append((name, figure if size > NEGLIGIBLE else "held"))
+    return rows
+
+
+def alignment_rows(part: MeasuredPart) -> list[tuple[str, str]]:
+    """Return the figures of the alignment."""
+    rows = []
+    for k, alignment in enumerate(part.alignments, start=1):
+        of_file = f", file {k}" if len(part.alignments) > 1 else ""
+        rows.append((f"robust residual{of_file}", f"{significant(alignment.residual, 3)} mm"))
+        rows.append((f"points used{of_file}", f"{alignment.count} of {len(alignment.used)}"))
+        pose = alignment.cad_from_measured
+        rows.append((f"turned by{of_file}", f"{number(float(np.degrees(pose.angle)), 3)}°"))
+        rows.append((f"moved by{of_file}", f"{number(float(np.linalg.norm(pose.translation)), 3)} mm"))
+        if alignment.scale != 1:
+            rows.append((f"scale{of_file}", f"{alignment.scale:.6f}"))
+    return rows
+
+
+def advice(part: MeasuredPart) -> str:
+    """Return what to do about a measurement without a result."""
+    if part.status is Status.AMBIGUOUS:
+        return (
+            "Choose the right candidate below and put its matrix into the recipe, as "
+            'alignment = { start = "pose", matrix = ... }, or name three or more landmarks.'
+        )
+    if part.status is Status.FAILED:
+        return (
+            "Check that the CAD model and its units belong to this measurement; if they do, start the alignment from "
+            "landmarks or from a pose."
+        )
+    return ""
+
+
+def _matrix(matrix: np.ndarray) -> str:
+    rows = [", ".join(f"{value + 0.0:.9f}" for value in row) for row in matrix]
+    return "matrix = [\n" + "\n".join(f"    [{row}]," for row in rows) + "\n]"
