@@ -38,6 +38,7 @@ class Part:
         from OCP.IFSelect import IFSelect_RetDone
         from OCP.Interface import Interface_Static
         from OCP.Message import Message, Message_Alarm
+        from OCP.StepBasic import StepBasic_Product
         from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
         from OCP.TCollection import TCollection_HAsciiString
 
@@ -45,10 +46,14 @@ class Part:
             printer.SetTraceLevel(Message_Alarm)
         writer = STEPControl_Writer()
         Interface_Static.SetCVal_s("write.step.unit", "MM")
-        Interface_Static.SetCVal_s("write.step.product.name", self.name)
         writer.Transfer(self.shape(), STEPControl_AsIs)
-        header = APIHeaderSection_MakeHeader(writer.Model())
-        header.SetName(TCollection_HAsciiString(self.name))
+        model, name = writer.Model(), TCollection_HAsciiString(self.name)
+        for entity in (model.Value(k) for k in range(1, model.NbEntities() + 1)):
+            if isinstance(entity, StepBasic_Product):
+                entity.SetId(name)
+                entity.SetName(name)
+        header = APIHeaderSection_MakeHeader(model)
+        header.SetName(name)
         header.SetTimeStamp(TCollection_HAsciiString(STAMP))
         if writer.Write(str(path)) != IFSelect_RetDone:
             raise InputError(f"{path} could not be written: check that the folder exists and can be written to.")
