@@ -10,7 +10,7 @@ import numpy as np
 
 from inspect3d.record import MeasuredPart, Record
 from inspect3d.report.colours import BAND_COLOURS, UNMEASURED
-from inspect3d.report.digits import COVERAGE, decimals, measured, number
+from inspect3d.report.digits import COVERAGE, decimals, grouped, measured, number
 from inspect3d.report.pose_words import PoseWords, advice, alignment_rows, motions, poses
 from inspect3d.report.reading import Reading, readings
 from inspect3d.report.uncertainty import Contribution, contributions
@@ -178,8 +178,8 @@ class _Figures:
         observed, nodes = self.values["observed"], self.values["nodes"]
         return [
             *((words, self.of(name, " mm")) for name, words in names.items()),
-            ("nodes measured", f"{observed} of {nodes}"),
-            ("nodes on edges, which have no deviation", str(creases)),
+            ("nodes measured", f"{grouped(observed)} of {grouped(nodes)}"),
+            ("nodes on edges, which have no deviation", grouped(creases)),
         ]
 
 

@@ -15,17 +15,17 @@ from inspect3d.report.layout import Layout
 def draw_colour_bar(canvas: Canvas, layout: Layout, scale: ColourScale, tolerance: Interval | None = None) -> None:
     """Draw the bar with its figures, the limits of the tolerance beside it, and the grey of what was not measured."""
     u = layout.unit
-    left, width = layout.right + 60 * u, 46 * u
+    left, width = layout.right + 66 * u, 46 * u
     top, bottom = layout.top + 70 * u, layout.bottom - 70 * u
     heading = f"{scale.title}, {scale.unit}" if scale.unit else scale.title
-    canvas.text(left - 28 * u, layout.top + 14 * u, heading, 23, weight="bold")
+    canvas.text(left - 32 * u, layout.top + 14 * u, heading, 26, weight="bold")
     if scale.classes:
         left = layout.right + 32 * u
         _draw_classes(canvas, scale, (left, width, top, bottom))
     else:
         _draw_values(canvas, scale, (left, width, top, bottom), tolerance)
     _patch(canvas, left, layout.bottom - 22 * u, 46 * u, 26 * u, UNMEASURED)
-    canvas.text(left + width + 16 * u, layout.bottom - 9 * u, "not measured", 20, color=PALE)
+    canvas.text(left + width + 16 * u, layout.bottom - 9 * u, "not measured", 24, color=PALE)
 
 
 def ticks(limits: Interval) -> Floats:
@@ -65,12 +65,12 @@ def _draw_values(
     for value, words in zip(values, tick_words(values), strict=True):
         y = bottom - (value - low) / (high - low) * (bottom - top)
         canvas.line([left + width, left + width + 9 * u], [y, y], width=1.5)
-        canvas.text(left + width + 16 * u, y, words, 24)
+        canvas.text(left + width + 16 * u, y, words, 29)
     for limit in tolerance or ():
         if low <= limit <= high:
             y = bottom - (limit - low) / (high - low) * (bottom - top)
             canvas.line([left - 14 * u, left + width], [y, y], width=3)
-            canvas.text(left - 18 * u, y, "tol.", 18, ha="right", color=INK)
+            canvas.text(left - 18 * u, y, "tol.", 22, ha="right", color=INK)
 
 
 def _draw_classes(canvas: Canvas, scale: ColourScale, box: tuple[float, float, float, float]) -> None:
@@ -80,7 +80,7 @@ def _draw_classes(canvas: Canvas, scale: ColourScale, box: tuple[float, float, f
     for k, (colour, words) in enumerate(zip(scale.colours[::-1], scale.classes[::-1], strict=True)):
         y = top + k * step
         _patch(canvas, left, y, width, 46 * u, colour)
-        canvas.text(left + width + 14 * u, y + 23 * u, words, 20)
+        canvas.text(left + width + 14 * u, y + 23 * u, words, 24)
 
 
 def _patch(canvas: Canvas, left: float, top: float, width: float, height: float, colour: object) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,10 @@ class ColourScale:
     colours: NDArray[np.uint8]
     classes: tuple[str, ...] = ()
 
+    def renamed(self, title: str, unit: str) -> ColourScale:
+        """Return the same colours for another field."""
+        return replace(self, title=title, unit=unit)
+
 
 def deviation_scale(limits: Interval) -> ColourScale:
     """Return blue for too little, red for too much and pale yellow for nominal, wherever zero lies in the limits.
@@ -61,6 +65,12 @@ def rising_scale(title: str, unit: str, limits: Interval) -> ColourScale:
 def band_scale() -> ColourScale:
     """Return the five classes of a tolerance: too little, undecided, conform, undecided, too much."""
     return ColourScale("Tolerance", "", (0.5, 5.5), np.array(BAND_COLOURS, dtype=np.uint8), BANDS)
+
+
+def verdict_scale() -> ColourScale:
+    """Return the classes of a verdict: conform, undecided, nonconform."""
+    colours = np.array(BAND_COLOURS[2:], dtype=np.uint8)
+    return ColourScale("Verdict", "", (0.5, 3.5), colours, ("conform", "undecided", "nonconform"))
 
 
 def symmetric_limits(values: Floats, areas: Floats) -> Interval:

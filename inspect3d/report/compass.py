@@ -29,20 +29,20 @@ def draw_compass(canvas: Canvas, layout: Layout, axes: Floats, pixel: float, wor
         length = float(np.hypot(right, up))
         if length < 0.05:
             canvas.axes.plot(x, y, marker="o", markersize=7 * u, color=COLOURS[k])
-            canvas.text(x - 16 * u, y + 18 * u, "xyz"[k], 22, ha="center", color=COLOURS[k])
+            canvas.text(x - 16 * u, y + 18 * u, "xyz"[k], 26, ha="center", color=COLOURS[k])
             continue
         arrow = {"arrowstyle": "-|>", "color": COLOURS[k], "lw": 2.2 * u, "mutation_scale": 13 * u}
         canvas.axes.annotate("", (x + arm * right, y - arm * up), (x, y), arrowprops=arrow)
         beyond = arm + 15 * u / max(length, 0.3)
-        canvas.text(x + beyond * right, y - beyond * up, "xyz"[k], 22, ha="center", color=COLOURS[k])
+        canvas.text(x + beyond * right, y - beyond * up, "xyz"[k], 26, ha="center", color=COLOURS[k])
     left = 220 * u
     length = round_length(pixel * 300 * u)
     right = left + length / pixel
     canvas.line([left, right], [y, y], width=4)
     for x in (left, right):
         canvas.line([x, x], [y - 8 * u, y + 8 * u], width=3)
-    canvas.text((left + right) / 2, y - 24 * u, f"{significant(length, 6)} mm", 22, ha="center")
-    canvas.text(layout.right - 20 * u, y, words, 20, ha="right", color=PALE)
+    canvas.text((left + right) / 2, y - 24 * u, f"{significant(length, 6)} mm", 27, ha="center")
+    canvas.text(layout.right - 20 * u, y, words, 25, ha="right", color=PALE)
     canvas.line([30 * u, layout.width - 30 * u], [layout.bottom + 4 * u] * 2, width=1, color=INK, alpha=0.15)
 
 

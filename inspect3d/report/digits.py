@@ -29,6 +29,11 @@ def number(value: float | None, places: int = 3, sign: bool = False) -> str:
     return text.replace("-", "−")
 
 
+def grouped(count: int) -> str:
+    """Return a count with its digits in groups of three, as ISO 80000-1 has them."""
+    return f"{count:,}".replace(",", "\u202f")
+
+
 def measured(value: float, sigma: float, unit: str = "mm") -> str:
     """Return value ± U (k = 2), both at the last digit that U warrants, such as "+0.123 ± 0.011 mm"."""
     if not math.isfinite(value):

@@ -29,7 +29,7 @@ def draw_flags(canvas: Canvas, layout: Layout, seen: Sequence[Reading], pixels: 
     for left in (True, False):
         members = _side(pixels, left)
         members = members[np.argsort(pixels[members, 1])]
-        height, room = 62 * layout.unit, layout.bottom - layout.top
+        height, room = 72 * layout.unit, layout.bottom - layout.top
         members = members[: int(room // (height * 1.1))]
         heights = spread(pixels[members, 1], height * 1.1, layout.top + height / 2, layout.bottom - height / 2)
         for k, y in zip(members, heights, strict=True):
@@ -56,7 +56,7 @@ def _side(pixels: Floats, left: bool) -> np.ndarray:
 
 def _draw_flag(canvas: Canvas, layout: Layout, reading: Reading, pixel: Floats, y: float, left: bool) -> None:
     u = layout.unit
-    width, height = layout.column - 24 * u, 56 * u
+    width, height = layout.column - 24 * u, 66 * u
     x = 12 * u if left else layout.right - 12 * u - width
     colour = FRAMES[reading.verdict]
     edge = x + width if left else x
@@ -65,5 +65,5 @@ def _draw_flag(canvas: Canvas, layout: Layout, reading: Reading, pixel: Floats, 
     xs, ys = [x, x + width, x + width, x, x], [y - height / 2] * 2 + [y + height / 2] * 2 + [y - height / 2]
     canvas.axes.fill(xs, ys, color="white", zorder=2.5)
     canvas.line(xs, ys, width=2.5, color=colour, zorder=2.6)
-    canvas.fitted(x + 9 * u, y - 13 * u, reading.name, 19, width - 18 * u, weight="bold")
-    canvas.fitted(x + 9 * u, y + 13 * u, measured(reading.value, reading.sigma, unit=""), 19, width - 12 * u)
+    canvas.fitted(x + 9 * u, y - 16 * u, reading.name, 23, width - 18 * u, weight="bold")
+    canvas.fitted(x + 9 * u, y + 15 * u, measured(reading.value, reading.sigma, unit=""), 23, width - 12 * u)

@@ -43,7 +43,7 @@ def draw_histogram(
     canvas = Canvas(layout.width, layout.height)
     u = canvas.unit
     caption.write(canvas)
-    box = (170 * u, 200 * u, layout.width - 70 * u, layout.height - 150 * u)
+    box = (170 * u, 240 * u, layout.width - 90 * u, layout.height - 150 * u)
     left, top, right, bottom = box
     figures = Statistics.of(values, areas)
     low, high = _span(scale.limits, tolerance, figures)
@@ -58,7 +58,7 @@ def draw_histogram(
 
     for value, words in _marks((0.0, tallest)):
         canvas.line([left, right], [float(y(value))] * 2, width=1, color="#d9dde2", zorder=0.5)
-        canvas.text(left - 14 * u, float(y(value)), words, 22, ha="right")
+        canvas.text(left - 14 * u, float(y(value)), words, 26, ha="right")
     middle = (edges[:-1] + edges[1:]) / 2
     position = np.interp(middle, scale.limits, (0, len(scale.colours) - 1)).round().astype(int)
     canvas.axes.bar(
@@ -67,7 +67,7 @@ def draw_histogram(
     )  # fmt: skip
     for value, words in _marks((low, high)):
         canvas.line([float(x(value))] * 2, [bottom, bottom + 9 * u], width=1.5)
-        canvas.text(float(x(value)), bottom + 30 * u, words, 22, ha="center")
+        canvas.text(float(x(value)), bottom + 30 * u, words, 26, ha="center")
     canvas.line([left, right], [bottom, bottom], width=1.5)
     _mark_value(
         canvas, box, float(x(figures.mean)), f"mean {number(figures.mean, _places(figures), sign=True)}", "--", 0
@@ -76,8 +76,8 @@ def draw_histogram(
         if low <= limit <= high:
             _mark_value(canvas, box, float(x(limit)), f"tolerance {limit:+g}".replace("-", "−"), "-", 1)
     ends = "; the outermost bars hold what lies beyond" if values.min() < low or values.max() > high else ""
-    canvas.text((left + right) / 2, layout.height - 72 * u, f"Deviation, mm{ends}", 24, ha="center")
-    canvas.text(42 * u, (top + bottom) / 2, "Share of the measured area, %", 24, ha="center", rotation=90)
+    canvas.text((left + right) / 2, layout.height - 72 * u, f"Deviation, mm{ends}", 28, ha="center")
+    canvas.text(42 * u, (top + bottom) / 2, "Share of the measured area, %", 28, ha="center", rotation=90)
     canvas.save(file)
 
 
@@ -105,7 +105,7 @@ def _mark_value(
 ) -> None:
     left, top, right, bottom = box
     u = canvas.unit
-    height = top - (14 + 30 * row) * u
+    height = top - (14 + 38 * row) * u
     canvas.line([x, x], [height + 14 * u, bottom], width=2.5, linestyle=style, zorder=2)
-    margin = 110 * u
-    canvas.text(min(max(x, left + margin), right - margin), height, words, 21, ha="center", color=INK if row else PALE)
+    margin = 130 * u
+    canvas.text(min(max(x, left + margin), right - margin), height, words, 26, ha="center", color=INK if row else PALE)

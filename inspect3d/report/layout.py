@@ -27,17 +27,17 @@ class Layout:
     @property
     def column(self) -> int:
         """Return the width of a column of flags, px."""
-        return round(230 * self.unit) if self.flags else round(30 * self.unit)
+        return round(262 * self.unit) if self.flags else round(30 * self.unit)
 
     @property
     def top(self) -> int:
         """Return where the drawing begins, px from the top."""
-        return round(145 * self.unit)
+        return round(158 * self.unit)
 
     @property
     def right(self) -> int:
         """Return where the colour bar's column begins, px from the left."""
-        return self.width - round(270 * self.unit)
+        return self.width - round(285 * self.unit)
 
     @property
     def bottom(self) -> int:

@@ -14,7 +14,7 @@ import numpy as np
 
 from inspect3d.record import Record
 from inspect3d.report.account import account
-from inspect3d.report.digits import number
+from inspect3d.report.digits import grouped, number
 from inspect3d.report.pictures import Shown
 from inspect3d.report.viewer import viewer_data
 from inspect3d.report.viewpoint import Viewpoint
@@ -22,11 +22,10 @@ from inspect3d.report.viewpoint import Viewpoint
 
 @dataclass(frozen=True)
 class Embedded:
-    """A picture inside the page: a data URI, its caption, and whether it takes the whole width."""
+    """A picture inside the page: a data URI and its caption."""
 
     data: str
     words: str
-    wide: bool
 
 
 def page(
@@ -72,10 +71,10 @@ def _part(record: Record, values: Mapping[str, Any], picture: str) -> dict[str, 
     size = " × ".join(number(float(length), 1) for length in np.ptp(mesh.nodes, axis=0))
     rows = [
         ("size", f"{size} mm"),
-        ("surface", f"{number(values['area'], 0)} mm²"),
-        ("nodes of the inspection mesh", str(len(mesh))),
+        ("surface", f"{grouped(round(values['area']))} mm²"),
+        ("nodes of the inspection mesh", grouped(len(mesh))),
         ("median edge of the inspection mesh", f"{number(values['edge_length'], 2)} mm"),
-        ("nodes on edges sharper than 30°", str(int(np.count_nonzero(mesh.crease)))),
+        ("nodes on edges sharper than 30°", grouped(int(np.count_nonzero(mesh.crease)))),
     ]
     if tolerance is not None:
         rows.append(("probability of the decision rule", f"{record.recipe.part.probability:g}"))
@@ -98,7 +97,7 @@ def _start(shown: Mapping[str, tuple[Shown, ...]]) -> Viewpoint:
 
 def _embedded(folder: Path, shown: Shown) -> Embedded:
     data = base64.b64encode((folder / shown.file).read_bytes()).decode()
-    return Embedded(f"data:image/png;base64,{data}", shown.words, wide=shown.viewpoint is None)
+    return Embedded(f"data:image/png;base64,{data}", shown.words)
 
 
 def _asset(name: str) -> str:

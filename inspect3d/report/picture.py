@@ -32,9 +32,9 @@ class Caption:
         """Write the words at the top of a sheet."""
         u = canvas.unit
         width = canvas.width - 60 * u
-        canvas.fitted(30 * u, 36 * u, self.title, 36, width, weight="bold")
-        canvas.fitted(30 * u, 76 * u, self.subtitle, 25, width)
-        canvas.fitted(30 * u, 110 * u, self.figures, 22, width, color=PALE)
+        canvas.fitted(30 * u, 40 * u, self.title, 40, width, weight="bold")
+        canvas.fitted(30 * u, 86 * u, self.subtitle, 30, width)
+        canvas.fitted(30 * u, 126 * u, self.figures, 25, width, color=PALE)
 
 
 @dataclass(frozen=True, eq=False)

@@ -131,7 +131,7 @@ def _draw_measurement(record: Record, part: MeasuredPart, folder: Path, views: V
     if areas.sum() > 0:
         caption = Caption(table.name, f"{part.name}: how the measured area is spread over the deviations", figures)
         file = f"{part.name}_histogram.png"
-        draw_histogram(folder / file, values, areas, scale, caption, table.tolerance, Layout(1600, 900))
+        draw_histogram(folder / file, values, areas, scale, caption, table.tolerance, Layout(*SIZE))
         shown.append(Shown(file, "Histogram of the deviations"))
     return shown
 

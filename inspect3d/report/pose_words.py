@@ -9,7 +9,7 @@ import numpy as np
 from inspect3d.outcome import Status
 from inspect3d.record import MeasuredPart
 from inspect3d.register.alignment import Alignment
-from inspect3d.report.digits import number, significant
+from inspect3d.report.digits import grouped, number, significant
 from inspect3d.report.results import candidates
 
 MOTIONS = ("turn about x", "turn about y", "turn about z", "shift along x", "shift along y", "shift along z")
@@ -35,14 +35,12 @@ def poses(part: MeasuredPart) -> tuple[PoseWords, ...]:
             found.append(
                 PoseWords(f"Pose{of_file}: CAD from measured", "", _matrix(alignment.cad_from_measured.matrix))
             )
-    considered = candidates(part)
-    if part.status.has_map and len(considered) < 2:
-        return tuple(found)
-    for k, candidate in enumerate(considered, start=1):
+    others = 1 if part.status.has_map else 0
+    for k, candidate in enumerate(candidates(part)[others:], start=others + 1):
         residual = significant(candidate.residual, 3)
         scale = f", scale {candidate.scale:.6g}" if candidate.scale != 1 else ""
         words = f"Pose {k} of those considered, best first: robust residual {residual} mm{scale}."
-        found.append(PoseWords(f"Candidate {k}: residual {residual} mm", words, _matrix(candidate.pose.matrix)))
+        found.append(PoseWords(f"Candidate {k}, residual {residual} mm", words, _matrix(candidate.pose.matrix)))
     return tuple(found)
 
 
@@ -62,7 +60,7 @@ def alignment_rows(part: MeasuredPart) -> list[tuple[str, str]]:
     for k, alignment in enumerate(part.alignments, start=1):
         of_file = f", file {k}" if len(part.alignments) > 1 else ""
         rows.append((f"robust residual{of_file}", f"{significant(alignment.residual, 3)} mm"))
-        rows.append((f"points used{of_file}", f"{alignment.count} of {len(alignment.used)}"))
+        rows.append((f"points used{of_file}", f"{grouped(alignment.count)} of {grouped(len(alignment.used))}"))
         pose = alignment.cad_from_measured
         rows.append((f"turned by{of_file}", f"{number(float(np.degrees(pose.angle)), 3)}°"))
         rows.append((f"moved by{of_file}", f"{number(float(np.linalg.norm(pose.translation)), 3)} mm"))

@@ -12,7 +12,7 @@ from inspect3d.nominal.nominal import InspectionMesh
 from inspect3d.recipe import Label
 from inspect3d.record import MeasuredPart
 
-NEAR = 3.0
+NEAR = 2.0
 """Edge lengths of the mesh within which a node speaks for a named point."""
 
 
@@ -24,7 +24,7 @@ class Reading:
     ----------
     name : of the label
     asked : (3,) mm, where the recipe puts it
-    node : the nearest observed node, or None where there is none within three edge lengths
+    node : the nearest observed node, or None where there is none within two edge lengths
     position : (3,) mm, of that node; of the asked point where there is none
     value, sigma : deviation and standard uncertainty there, mm; NaN where there is no node
     verdict : 0 none, 1 conform, 2 undecided, 3 nonconform

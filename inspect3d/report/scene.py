@@ -110,7 +110,7 @@ def scene(
     surface = triangulated(nodes, triangles)
     plotter = Plotter(off_screen=True, window_size=list(size), lighting="none")
     try:
-        plotter.set_background("white")
+        plotter.renderer.SetBackground(1.0, 1.0, 1.0)
         _light(plotter)
         shown = np.isfinite(values)
         if scale is None or not shown.any():

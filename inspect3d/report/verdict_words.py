@@ -39,7 +39,7 @@ def verdict_words(mesh: InspectionMesh, part: MeasuredPart) -> VerdictWords:
     if part.verdict is None:
         return VerdictWords("none", "no tolerance", "The recipe states no tolerance, so there is no verdict.")
     verdict, areas = np.asarray(part.verdict), mesh.areas
-    whole = areas[~mesh.crease].sum() or 1.0
+    whole = areas.sum() or 1.0
 
     def share(nodes: np.ndarray) -> str:
         percent = 100 * areas[nodes].sum() / whole

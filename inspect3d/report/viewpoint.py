@@ -11,6 +11,8 @@ import numpy as np
 from inspect3d.arrays import Floats, floats, unit
 from inspect3d.outcome import InputError
 
+SIDES = {"front": "-y", "back": "+y", "left": "-x", "right": "+x", "top": "+z", "bottom": "-z"}
+
 
 @dataclass(frozen=True, eq=False)
 class Viewpoint:
@@ -32,7 +34,7 @@ class Viewpoint:
 
     @classmethod
     def of(cls, view: str | tuple[float, float]) -> Viewpoint:
-        """Return the viewpoint called "iso", "+x", "-y+z", ..., or at (azimuth, elevation) in degrees.
+        """Return the viewpoint called "iso", "front", "+x", "-y+z", ..., or at (azimuth, elevation) in degrees.
 
         The azimuth turns from +x towards +y, the elevation rises towards +z; "30,20" means the same as (30, 20).
 
@@ -46,6 +48,7 @@ class Viewpoint:
         text = view.strip().lower()
         if text == "iso":
             return cls("iso", np.ones(3))
+        text = SIDES.get(text, text)
         if re.fullmatch(r"([+-][xyz]){1,3}", text) and len(set(text[1::2])) == len(text) // 2:
             signs = {axis: 1.0 if sign == "+" else -1.0 for sign, axis in zip(text[::2], text[1::2], strict=True)}
             return cls(text, np.array([signs.get(axis, 0.0) for axis in "xyz"]))
@@ -53,7 +56,8 @@ class Viewpoint:
             azimuth, elevation = (float(part) for part in text.split(","))
         except ValueError:
             raise InputError(
-                f"There is no view {view!r}: use iso, an axis such as +x or -y+z, or azimuth,elevation in degrees."
+                f"There is no view {view!r}: use iso, front, back, left, right, top, bottom, axes such as +x or -y+z, "
+                "or azimuth,elevation in degrees."
             ) from None
         return cls._at(azimuth, elevation)
 

@@ -270,11 +270,12 @@
     probe.style.transform = `translate(${Math.max(left, 0)}px, ${Math.max(y - 52, 0)}px)`;
   }
   function pin(node, name) {
-    const flag = made("div", "pin"), text = made("span", "");
+    const flag = made("div", "pin"), tag = made("div", "tag"), text = made("span", "");
     const close = made("button", "", "\u00d7");
     close.title = "remove this flag";
     close.addEventListener("click", () => { pins = pins.filter((each) => each.flag !== flag); flag.remove(); });
-    flag.append(text, close);
+    tag.append(text, close);
+    flag.append(tag);
     overlay.append(flag);
     pins.push({ node, name, flag, text });
     draw();
@@ -286,6 +287,7 @@
       const facing = t[2][0] * normals[3 * k] + t[2][1] * normals[3 * k + 1] + t[2][2] * normals[3 * k + 2] > 0;
       each.flag.hidden = !facing || x < 0 || y < 0 || x > canvas.clientWidth || y > canvas.clientHeight;
       each.text.textContent = (each.name ? `${each.name}: ` : "") + words(k);
+      each.flag.classList.toggle("flipped", x > 0.7 * canvas.clientWidth);
       each.flag.style.transform = `translate(${x}px, ${y}px)`;
     }
   }
