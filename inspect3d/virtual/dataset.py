@@ -41,10 +41,10 @@ def write_dataset(dataset: Dataset, folder: Path, seed: int) -> Truth:
     InputError
         The folder cannot be written.
     """
-    scan = dataset.scanner(dataset.part.surface(), dataset.deviation, seed)
-    truth = Truth(dataset.deviation, scan.scan_from_cad, scan.noise, np.flatnonzero(scan.foreign), seed)
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        scan = dataset.scanner(dataset.part.surface(), dataset.deviation, seed)
+        truth = Truth(dataset.deviation, scan.scan_from_cad, scan.noise, np.flatnonzero(scan.foreign), seed)
         write_ply(folder / "scan.ply", scan.points_scan)
         truth.write(folder / "truth.json")
         (folder / "recipe.toml").write_text(dataset.recipe, encoding="utf-8")

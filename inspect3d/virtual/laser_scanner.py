@@ -107,7 +107,7 @@ class LaserScanner:
         camera = cos(self.triangulation) * view + sin(self.triangulation) * across
 
         start, extent = surface.vertices.min(axis=0), np.ptp(surface.vertices, axis=0)
-        reach = np.linalg.norm(extent)
+        reach = float(np.linalg.norm(extent))
         lines = np.arange(-reach / 2, reach / 2, self.line_spacing)
         steps = np.arange(-reach / 2, reach / 2, self.point_spacing)
         u = lines[:, None] + random.uniform(0.0, self.line_spacing) + np.zeros(len(steps))
