@@ -76,9 +76,7 @@ def test_the_bracket_has_the_volume_of_its_primitives():
 
 def test_a_step_file_gives_the_part_back(part, tmp_path):
     part.write_step(tmp_path / "part.step")
-    assert volume_and_area(step_shape(tmp_path / "part.step")) == pytest.approx(
-        volume_and_area(part.shape()), rel=1e-9
-    )
+    assert volume_and_area(step_shape(tmp_path / "part.step")) == pytest.approx(volume_and_area(part.shape()), rel=1e-9)
 
 
 def test_the_same_part_gives_the_same_step_file(part, tmp_path, capfd):
