@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from inspect3d.arrays import Booleans, Floats, booleans, floats
-from inspect3d.outcome import Status
+from inspect3d.outcome import MeasurementError, Status
 from inspect3d.pose import Pose
 
 
@@ -75,3 +75,19 @@ class Alignment:
     def count(self) -> int:
         """Return how many points took part in the fit."""
         return int(np.count_nonzero(self.used))
+
+
+class NoAlignmentError(MeasurementError):
+    """The measured points have no single pose in the CAD frame.
+
+    Parameters
+    ----------
+    sentence : what is wrong and what to do
+    status : FAILED or AMBIGUOUS
+    candidates : the poses considered, best first
+    """
+
+    def __init__(self, sentence: str, status: Status = Status.FAILED, candidates: tuple[Candidate, ...] = ()) -> None:
+        super().__init__(sentence)
+        self.status = status
+        self.candidates = candidates

@@ -1,0 +1,219 @@
+"""Stage 4: the deviation of clouds that lie near their place in the CAD frame, in the common alignment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inspect3d.arrays import Booleans, Floats
+from inspect3d.deviate.cloud_to_node import CloudToNode, NodeFit
+from inspect3d.deviate.deviation import Deviation
+from inspect3d.measure import Cloud
+from inspect3d.nominal.nominal import Nominal
+from inspect3d.nominal.surface import Feet
+from inspect3d.outcome import MeasurementError, Status
+from inspect3d.pose import Pose
+from inspect3d.register.alignment import Alignment
+from inspect3d.register.gauge import Gauge, best_fit
+from inspect3d.register.icp import MAD, TUKEY
+from inspect3d.register.mobility import jacobian, named
+
+FOREIGN = 0.02  # share of the CAD's diagonal beyond which a point is foreign, unless the recipe gives a reach
+BLOCKS = 8  # cells along the diagonal within which errors may correlate
+SETTLED = 0.02  # share of the usual uncertainty below which the last motion of a node ends the alignment
+LEAST_NODES = 12
+
+
+@dataclass(frozen=True, eq=False)
+class CloudDeviation:
+    """What clouds say about a part.
+
+    Parameters
+    ----------
+    deviation : the map on the inspection mesh
+    alignments : of the clouds, with the last step of the common alignment in them
+    points_cad : (k, 3) mm, all points in the CAD frame, in order
+    distance : (k,) mm, signed distance of each point; NaN where its foot lies on a rim or is out of reach
+    noise : mm, standard uncertainty of a point, given or found
+    remarks : what was decided on the way, a sentence each
+    """
+
+    deviation: Deviation
+    alignments: tuple[Alignment, ...]
+    points_cad: Floats
+    distance: Floats
+    noise: float
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Deviate:
+    """Measure the deviation of clouds at the nodes, and bring it into the common alignment.
+
+    The common alignment is the robust best fit of the map itself, weighted by area (`Gauge`): the rigid motion found in
+    the map moves the points, until none is left. The map's uncertainty is that of the local fits through the same
+    linear map, G S G'; what all nodes share (coating, calibration, chord of the tessellation) is added.
+
+    Parameters
+    ----------
+    to_node : how points become nodes
+    refine : False keeps the given alignment; its covariance then adds to the map's, S + J C J'
+    reach : mm, points farther than this from the CAD are foreign; None: 2 % of the CAD's diagonal
+    coating : mm, thickness of paint, subtracted
+    coating_sigma, calibration : mm, standard uncertainties that all nodes share
+    steps : of the alignment at the most
+    """
+
+    to_node: CloudToNode = CloudToNode()
+    refine: bool = True
+    reach: float | None = None
+    coating: float = 0.0
+    coating_sigma: float = 0.0
+    calibration: float = 0.0
+    steps: int = 6
+
+    def __call__(
+        self, clouds: tuple[Cloud, ...], alignments: tuple[Alignment, ...], nominal: Nominal, counted: Booleans
+    ) -> CloudDeviation:
+        """Return the deviation of clouds.
+
+        Parameters
+        ----------
+        clouds, alignments : one alignment for each cloud
+        nominal : the part as designed
+        counted : (n,), the nodes that the recipe does not exclude
+
+        Raises
+        ------
+        MeasurementError
+            The points are too few or too far off for any node to be observed.
+        """
+        mesh = nominal.mesh
+        points = np.concatenate([place(cloud.points) for cloud, place in zip(clouds, alignments, strict=True)])
+        normals = _normals(clouds, alignments)
+        noise = _common_noise(clouds)
+        moved = Pose.identity()
+        for _ in range(self.steps):
+            feet = nominal.surface.closest(moved(points))
+            fit = self._observe(nominal, feet, moved.turned(normals), noise, counted)
+            seen = np.flatnonzero(fit.observed)
+            value = fit.value[seen] - self.coating
+            gauge = best_fit(mesh.nodes[seen], mesh.normals[seen], mesh.areas[seen], value)
+            if not self.refine:
+                break
+            motion = gauge.motion(value)
+            if np.abs(gauge.jacobian @ motion).max() < SETTLED * np.sqrt(np.median(fit.variance[seen])):
+                break
+            moved = Pose.small(motion, gauge.origin) @ moved
+        deviation = self._map(fit, value, gauge, alignments, nominal)
+        distance = np.where(feet.on_rim, np.nan, feet.distance - self.coating)
+        distance[np.abs(feet.distance) > (self.reach or np.inf)] = np.nan
+        placed = self._aligned(alignments, moved, gauge, value, clouds, distance)
+        return CloudDeviation(deviation, placed, moved(points), distance, fit.noise, self._remarks(nominal, feet))
+
+    def _remarks(self, nominal: Nominal, feet: Feet) -> tuple[str, ...]:
+        reach = self.reach or FOREIGN * nominal.diagonal
+        far = np.count_nonzero(np.abs(feet.distance - self.coating) >= reach)
+        if not far:
+            return ()
+        rule = "the reach of the recipe" if self.reach else "2 % of the CAD's diagonal, since the recipe gives no reach"
+        return (
+            f"{far} of {len(feet.distance)} points lie more than {reach:.3g} mm from the CAD ({rule}) and were left out.",
+        )
+
+    def _observe(
+        self, nominal: Nominal, feet: Feet, normals: Floats, noise: float | None, counted: Booleans
+    ) -> NodeFit:
+        reach = self.reach or FOREIGN * nominal.diagonal
+        cosine = np.einsum("ni,ni->n", normals, feet.normals)
+        near = np.abs(feet.distance - self.coating) < reach
+        told = np.linalg.norm(normals, axis=1) > 0.5
+        trusted = np.count_nonzero(cosine[near & told] > 0) > 0.7 * max(np.count_nonzero(near & told), 1)
+        part = near & (~told | (cosine > 0)) if trusted else near
+        fit = self.to_node(nominal.mesh, feet, part, noise)
+        observed = fit.observed & counted
+        if np.count_nonzero(observed) < LEAST_NODES:
+            raise MeasurementError(
+                f"Only {np.count_nonzero(observed)} of {len(nominal.mesh)} nodes have enough measured points around them: "
+                f"choose a larger element_size (it is {nominal.mesh.edge_length:.3g} mm), a larger reach, or scan more densely."
+            )
+        hidden = ~observed
+        return replace(
+            fit,
+            observed=observed,
+            value=np.where(hidden, np.nan, fit.value),
+            variance=np.where(hidden, np.nan, fit.variance),
+        )
+
+    def _map(
+        self, fit: NodeFit, value: Floats, gauge: Gauge, alignments: tuple[Alignment, ...], nominal: Nominal
+    ) -> Deviation:
+        """Return the map: the values in the gauge, and the variance of all that enters them."""
+        seen = np.flatnonzero(fit.observed)
+        local = fit.variance[seen]
+        coating = np.full(len(seen), self.coating_sigma)
+        if self.refine:
+            value, variance = gauge(value), gauge.variances(local) + gauge(coating) ** 2
+        else:
+            rows = jacobian(gauge.nodes, gauge.normals, alignments[0].origin)
+            variance = local + np.einsum("ij,jk,ik->i", rows, alignments[0].covariance, rows) + coating**2
+        variance = variance + self.calibration**2 + nominal.chord**2 / 12
+        full_value, full_sigma = np.full(len(fit.value), np.nan), np.full(len(fit.value), np.nan)
+        full_value[seen], full_sigma[seen] = value, np.sqrt(variance)
+        return Deviation(full_value, full_sigma, fit.observed)
+
+    def _aligned(
+        self,
+        alignments: tuple[Alignment, ...],
+        moved: Pose,
+        gauge: Gauge,
+        value: Floats,
+        clouds: tuple[Cloud, ...],
+        distance: Floats,
+    ) -> tuple[Alignment, ...]:
+        """Return the alignments with the last motion, and what the map says about them."""
+        if not self.refine:
+            return alignments
+        free = named(gauge.free, gauge.origin, gauge.length)
+        covariance = gauge.covariance(gauge(value), gauge.length * 2 / BLOCKS)
+        ends = np.cumsum([len(cloud) for cloud in clouds])
+        result = []
+        for alignment, cloud, end in zip(alignments, clouds, ends, strict=True):
+            own = distance[end - len(cloud) : end]
+            told = own[np.isfinite(own)]
+            middle = np.median(told)
+            residual = float(MAD * np.median(np.abs(told - middle)))
+            used = np.isfinite(own) & (np.abs(own - middle) < TUKEY * max(residual, 1e-12))
+            result.append(
+                replace(
+                    alignment,
+                    cad_from_measured=moved @ alignment.cad_from_measured,
+                    residual=float(MAD * np.median(np.abs(own[used] - np.median(own[used])))),
+                    covariance=covariance,
+                    origin=gauge.origin,
+                    used=used,
+                    status=Status.FREE_MOTIONS if free else _without_freedom(alignment.status),
+                    free=free,
+                )
+            )
+        return tuple(result)
+
+
+def _without_freedom(status: Status) -> Status:
+    return Status.OK if status is Status.FREE_MOTIONS else status
+
+
+def _normals(clouds: tuple[Cloud, ...], alignments: tuple[Alignment, ...]) -> Floats:
+    """Return the measured normals in the CAD frame, zero where there are none, (k, 3)."""
+    return np.concatenate(
+        [
+            np.zeros_like(cloud.points) if cloud.normals is None else place.cad_from_measured.turned(cloud.normals)
+            for cloud, place in zip(clouds, alignments, strict=True)
+        ]
+    )
+
+
+def _common_noise(clouds: tuple[Cloud, ...]) -> float | None:
+    told = [cloud.noise for cloud in clouds if cloud.noise is not None]
+    return max(told) if len(told) == len(clouds) else None

@@ -1,0 +1,186 @@
+"""Kernel of the cloud-to-node step: a robust polynomial of the signed distance around each node.
+
+Arrays only. Points are given by their feet on the nominal surface, sorted by the cell of a grid they lie in.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit, prange
+
+QUADRATIC, LINEAR = 6, 3  # unknowns of the polynomial
+ENOUGH = 15  # points that a quadratic polynomial wants
+LEAST = 6  # points below which a node is not observed
+REJECTED = 4.0  # scales at which a point is left out of the fit
+SAME_SIDE = 0.7  # cosine between the normals of node and foot
+MOST = 2000  # points used around a node; more are thinned evenly
+
+
+@njit(cache=True)
+def _span(keys, key):
+    return np.searchsorted(keys, key), np.searchsorted(keys, key + 1)
+
+
+@njit(cache=True)
+def _gather(node, normal, radius, low, cell, shape, keys, feet, foot_normals, found):
+    """Write the indices of the points around a node into `found`; return how many there are (they may be thinned)."""
+    total = 0
+    reach = int(math.ceil(radius / cell))
+    i0, j0, k0 = int((node[0] - low[0]) / cell), int((node[1] - low[1]) / cell), int((node[2] - low[2]) / cell)
+    for sweep in range(2):
+        stride = 1 if sweep == 0 else total // len(found) + 1
+        if sweep == 1 and stride == 1:
+            break
+        total = 0
+        for i in range(max(i0 - reach, 0), min(i0 + reach, shape[0] - 1) + 1):
+            for j in range(max(j0 - reach, 0), min(j0 + reach, shape[1] - 1) + 1):
+                for k in range(max(k0 - reach, 0), min(k0 + reach, shape[2] - 1) + 1):
+                    first, last = _span(keys, (i * shape[1] + j) * shape[2] + k)
+                    for p in range(first, last):
+                        square = 0.0
+                        cosine = 0.0
+                        for a in range(3):
+                            square += (feet[p, a] - node[a]) ** 2
+                            cosine += foot_normals[p, a] * normal[a]
+                        if square > radius * radius or cosine < SAME_SIDE:
+                            continue
+                        if total % stride == 0 and total // stride < len(found):
+                            found[total // stride] = p
+                        total += 1
+        if sweep == 1:
+            total = (total + stride - 1) // stride
+    return min(total, len(found))
+
+
+@njit(cache=True)
+def _solve(columns, y, kept, unknowns, matrix, coefficients):
+    """Write the least-squares polynomial of the kept points; return the variance factor of its value at the node."""
+    right = np.zeros(unknowns)
+    for a in range(unknowns):
+        for b in range(unknowns):
+            matrix[a, b] = 0.0
+    for p in range(len(y)):
+        if not kept[p]:
+            continue
+        for a in range(unknowns):
+            right[a] += columns[p, a] * y[p]
+            for b in range(a + 1):
+                matrix[a, b] += columns[p, a] * columns[p, b]
+    for i in range(unknowns):
+        for j in range(i + 1):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            if i == j:
+                if total < 1e-9 * (matrix[0, 0] + 1e-300):
+                    return math.inf
+                matrix[i, i] = math.sqrt(total)
+            else:
+                matrix[i, j] = total / matrix[j, j]
+    # forward substitution of the right-hand side and of the first unit vector
+    first = np.zeros(unknowns)
+    first[0] = 1.0
+    factor = 0.0
+    for i in range(unknowns):
+        for k in range(i):
+            right[i] -= matrix[i, k] * right[k]
+            first[i] -= matrix[i, k] * first[k]
+        right[i] /= matrix[i, i]
+        first[i] /= matrix[i, i]
+        factor += first[i] * first[i]
+    for i in range(unknowns - 1, -1, -1):
+        for k in range(i + 1, unknowns):
+            right[i] -= matrix[k, i] * right[k]
+        right[i] /= matrix[i, i]
+        coefficients[i] = right[i]
+    return factor
+
+
+@njit(cache=True)
+def _fit(columns, y, noise, unknowns):
+    """Return value at the node, variance factor, sum of squared residuals, points kept; factor inf: no fit."""
+    n = len(y)
+    middle = np.median(y)
+    scale = max(1.4826 * np.median(np.abs(y - middle)), noise)
+    kept = np.abs(y - middle) <= REJECTED * scale
+    matrix, coefficients = np.empty((unknowns, unknowns)), np.zeros(unknowns)
+    residual = np.empty(n)
+    factor, squares, count = math.inf, 0.0, 0
+    for order in (LINEAR, unknowns, unknowns, unknowns, unknowns, unknowns, unknowns, unknowns):
+        factor = _solve(columns, y, kept, order, matrix, coefficients)
+        if not factor < math.inf:
+            return 0.0, math.inf, 0.0, 0
+        for p in range(n):
+            residual[p] = y[p]
+            for a in range(order):
+                residual[p] -= coefficients[a] * columns[p, a]
+        scale = max(1.4826 * np.median(np.abs(residual)) * math.sqrt(n / max(n - order, 1)), 0.5 * noise)
+        changed = False
+        squares, count = 0.0, 0
+        for p in range(n):
+            inside = abs(residual[p]) <= REJECTED * scale
+            changed = changed or inside != kept[p]
+            kept[p] = inside
+            if inside:
+                squares += residual[p] * residual[p]
+                count += 1
+        if order == unknowns and not changed:
+            break
+    if count <= unknowns + 2 or 2 * count < n:
+        return 0.0, math.inf, 0.0, 0
+    return coefficients[0], factor, squares, count - unknowns
+
+
+@njit(parallel=True, cache=True)
+def fit_nodes(nodes, normals, radii, noise, low, cell, shape, keys, feet, foot_normals, distance):
+    """Return value (mm), variance factor, residual sum of squares (mm²) and degrees of freedom for each node.
+
+    Parameters
+    ----------
+    nodes, normals : (n, 3)
+    radii : (n, k) mm, tried from the first on until there are enough points
+    noise : mm, floor of the rejection scale
+    low, cell, shape, keys : grid of the feet; keys (m,) sorted
+    feet, foot_normals, distance : of the points, (m, 3), (m, 3), (m,), in the order of the keys
+
+    Returns
+    -------
+    value (n,), factor (n,) with inf where the node is not observed, squares (n,), freedom (n,)
+    """
+    n = len(nodes)
+    value, factor = np.zeros(n), np.full(n, math.inf)
+    squares, freedom = np.zeros(n), np.zeros(n)
+    for i in prange(n):
+        found = np.empty(MOST, np.int64)
+        normal = normals[i]
+        helper = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.7 else np.array([0.0, 1.0, 0.0])
+        first = np.cross(normal, helper)
+        first /= math.sqrt(np.sum(first * first))
+        second = np.cross(normal, first)
+        count, radius = 0, 0.0
+        for level in range(radii.shape[1]):
+            radius = radii[i, level]
+            count = _gather(nodes[i], normal, radius, low, cell, shape, keys, feet, foot_normals, found)
+            if count >= ENOUGH:
+                break
+        if count < LEAST:
+            continue
+        columns, y = np.empty((count, 6)), np.empty(count)
+        for c in range(count):
+            p = found[c]
+            u = v = 0.0
+            for a in range(3):
+                u += (feet[p, a] - nodes[i, a]) * first[a] / radius
+                v += (feet[p, a] - nodes[i, a]) * second[a] / radius
+            columns[c, 0], columns[c, 1], columns[c, 2] = 1.0, u, v
+            columns[c, 3], columns[c, 4], columns[c, 5] = u * u, u * v, v * v
+            y[c] = distance[p]
+        if count >= ENOUGH:
+            value[i], factor[i], squares[i], freedom[i] = _fit(columns, y, noise, QUADRATIC)
+        if not factor[i] <= 1.0:
+            value[i], factor[i], squares[i], freedom[i] = _fit(columns, y, noise, LINEAR)
+        if not factor[i] <= 1.0:
+            factor[i] = math.inf
+    return value, factor, squares, freedom

@@ -1,0 +1,142 @@
+"""The common alignment: the rigid motion that every method's map is measured against."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from inspect3d.arrays import Floats, floats
+from inspect3d.register.mobility import jacobian, spread
+
+MAD = 1.4826
+TUKEY = 4.685
+FREE = 1e-3  # share of the stiffest motion's stiffness below which a motion is free
+
+
+@dataclass(frozen=True, eq=False)
+class Gauge:
+    """The map that takes the best-fit rigid motion out of a deviation field: G = I - J (J' W J)⁺ J' W.
+
+    Free motions are left alone: the inverse is a pseudo-inverse.
+
+    Parameters
+    ----------
+    nodes, normals : (n, 3) of the observed nodes, mm
+    weights : (n,) W, area times robust weight
+    """
+
+    nodes: Floats
+    normals: Floats
+    weights: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "weights", floats(self.weights, "weights", len(self.nodes)))
+
+    @cached_property
+    def origin(self) -> Floats:
+        """Return the weighted centre of the nodes, (3,) mm: small motions are about it."""
+        return np.average(self.nodes, axis=0, weights=self.weights)
+
+    @cached_property
+    def length(self) -> float:
+        """Return the spread of the nodes, mm: it weighs turns against shifts."""
+        return spread(self.nodes, self.weights, self.origin)
+
+    @cached_property
+    def jacobian(self) -> Floats:
+        """Return J, (n, 6): the change of each node's deviation under a small motion of the measured points."""
+        return jacobian(self.nodes, self.normals, self.origin)
+
+    @cached_property
+    def _spectrum(self) -> tuple[Floats, Floats]:
+        """Stiffness of the motions, ascending, and the motions as columns (6, 6); turns counted in units of `length`."""
+        rows = self.jacobian / np.array([self.length] * 3 + [1.0] * 3)
+        values, vectors = np.linalg.eigh((rows * self.weights[:, None]).T @ rows)
+        return values, vectors / np.array([self.length] * 3 + [1.0] * 3)[:, None]
+
+    @cached_property
+    def free(self) -> Floats:
+        """Return the motions that change no deviation, (k, 6), rad and mm about `origin`; k may be 0.
+
+        They span the null space of J' W J (N. Gelfand & L. J. Guibas, "Shape segmentation using local slippage
+        analysis", SGP 2004): stiffness below a thousandth of the stiffest motion's.
+        """
+        values, vectors = self._spectrum
+        return vectors[:, values < FREE * values[-1]].T
+
+    @cached_property
+    def inverse(self) -> Floats:
+        """Return (J' W J)⁺, (6, 6), with the free directions left out."""
+        values, vectors = self._spectrum
+        held = values >= FREE * values[-1]
+        return (vectors[:, held] / values[held]) @ vectors[:, held].T
+
+    @cached_property
+    def solver(self) -> Floats:
+        """Return M = (J' W J)⁺ J' W, (6, n): the rigid motion in a deviation field."""
+        return self.inverse @ (self.jacobian * self.weights[:, None]).T
+
+    def motion(self, values: Floats) -> Floats:
+        """Return the small motion (6,) of the measured points that best undoes a deviation field (n,) mm."""
+        return -self.solver @ values
+
+    def __call__(self, values: Floats) -> Floats:
+        """Return G v: fields (n,) or (n, k) without their rigid motion."""
+        return values - self.jacobian @ (self.solver @ values)
+
+    def variances(self, independent: Floats) -> Floats:
+        """Return the diagonal of G S G' for a diagonal S (n,) mm²."""
+        common = (self.solver * independent) @ self.solver.T
+        cross = np.einsum("ij,ji->i", self.jacobian, self.solver) * independent
+        return independent - 2 * cross + np.einsum("ij,jk,ik->i", self.jacobian, common, self.jacobian)
+
+    def covariance(self, residuals: Floats, block: float) -> Floats:
+        """Return the covariance (6, 6) of the motion, from a sandwich over spatial blocks.
+
+        Errors within a cube of edge `block` (mm) may correlate as they like; those of different cubes do not.
+
+        Notes
+        -----
+        K.-Y. Liang & S. L. Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73 (1986),
+        with the usual factor b / (b - p) for b blocks and p determined motions.
+        """
+        scores = self.jacobian * (self.weights * residuals)[:, None]
+        cells = np.floor((self.nodes - self.nodes.min(axis=0)) / block).astype(np.int64)
+        _, cell = np.unique(cells, axis=0, return_inverse=True)
+        sums = np.stack([np.bincount(cell.ravel(), scores[:, k]) for k in range(6)], axis=1)
+        determined = np.linalg.matrix_rank(self.inverse)
+        blocks = len(sums)
+        grow = blocks / max(blocks - determined, 1)
+        return grow * self.inverse @ (sums.T @ sums) @ self.inverse
+
+
+def best_fit(nodes: Floats, normals: Floats, areas: Floats, values: Floats, steps: int = 50) -> Gauge:
+    """Return the robust best-fit gauge of a deviation field: Tukey weights on what remains, times the areas.
+
+    Parameters
+    ----------
+    nodes, normals : (n, 3)
+    areas : (n,) mm²
+    values : (n,) mm
+    """
+    weights, remains = areas, values
+    for _ in range(steps):
+        scale = MAD * _weighted_median(np.abs(remains), areas)
+        if scale <= 0:
+            break
+        share = np.clip(1 - (remains / (TUKEY * scale)) ** 2, 0, None) ** 2
+        new = areas * share
+        settled = np.abs(new - weights).max() < 1e-4 * areas.max()
+        weights = new
+        remains = Gauge(nodes, normals, weights)(values)
+        if settled:
+            break
+    return Gauge(nodes, normals, weights)
+
+
+def _weighted_median(values: Floats, weights: Floats) -> float:
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(total, total[-1] / 2)])

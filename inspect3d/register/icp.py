@@ -1,0 +1,117 @@
+"""Robust point-to-plane ICP on the CAD surface itself, with Open3D's estimator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from inspect3d.arrays import Booleans, Floats
+from inspect3d.nominal.surface import Feet, Surface
+from inspect3d.pose import Pose
+from inspect3d.register.thinned import Thinned
+from inspect3d.system import import_open3d
+
+MAD = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
+TUKEY = 4.685  # scales at which Tukey's biweight rejects: 95 % efficient for normal noise
+OPPOSED = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A pose and how the points lie on the surface in it.
+
+    Parameters
+    ----------
+    pose : cad_from_cloud
+    feet : of the points on the surface
+    agrees : (n,), the normal of the point fits that of the surface, or it has none
+    scale : robust standard deviation of the distances about zero, mm
+    """
+
+    pose: Pose
+    feet: Feet
+    agrees: Booleans
+    scale: float
+
+    def cost(self, width: float) -> Floats:
+        """Return min(d², width²) / width² of each point, (n,); 1 where the normals disagree or the foot is on a rim."""
+        cost = np.minimum((self.feet.distance / width) ** 2, 1.0)
+        return np.where(self.agrees & ~self.feet.on_rim, cost, 1.0)
+
+
+@dataclass(frozen=True)
+class RobustIcp:
+    """Iterative closest points on a surface: feet by `Surface.closest`, motion by Open3D's point-to-plane estimator
+    with Tukey's kernel, whose width falls to that of the noise.
+
+    Twelve weightless pairs ("anchors") around the cloud keep a motion that nothing determines at rest: they shrink the
+    step by a part in a thousand, not the answer.
+
+    Parameters
+    ----------
+    steps : at the most
+    still : share of the robust scale below which the largest motion of a point ends the iteration
+    first_width : half width of the kernel in the first step, mm; None starts at the noise
+    least_scale : the scale is not taken smaller than this, mm
+    """
+
+    steps: int = 60
+    still: float = 1e-3
+    first_width: float | None = None
+    least_scale: float = 1e-6
+
+    def __call__(self, cloud: Thinned, surface: Surface, start: Pose) -> Fit:
+        """Return the fit that the iteration from `start` (cad_from_cloud) ends in."""
+        pose, width = start, self.first_width or np.inf
+        for _ in range(self.steps):
+            fit = fitted(cloud, surface, pose, self.least_scale)
+            width = max(min(0.7 * width, width), TUKEY * fit.scale) if np.isfinite(width) else TUKEY * fit.scale
+            part = fit.agrees & ~fit.feet.on_rim & (np.abs(fit.feet.distance) < width)
+            if np.count_nonzero(part) < 6:
+                return fit
+            points = pose(cloud.points[part])
+            motion = step(points, fit.feet.points[part], fit.feet.normals[part], width)
+            pose = motion @ pose
+            moved = np.abs(motion(points) - points).max()
+            if moved < self.still * fit.scale and width <= 1.01 * TUKEY * fit.scale:
+                break
+        return fitted(cloud, surface, pose, self.least_scale)
+
+
+def fitted(cloud: Thinned, surface: Surface, pose: Pose, least_scale: float = 0.0) -> Fit:
+    """Return how the points lie on the surface in a given pose."""
+    feet = surface.closest(pose(cloud.points))
+    cosine = np.einsum("ni,ni->n", pose.turned(cloud.normals), feet.normals)
+    told = np.linalg.norm(cloud.normals, axis=1) > 0.5
+    agrees = ~told | ((cosine if cloud.oriented else np.abs(cosine)) > OPPOSED)
+    part = agrees & ~feet.on_rim
+    distance = np.abs(feet.distance[part]) if part.any() else np.array([surface.diagonal])
+    return Fit(pose, feet, agrees, max(float(MAD * np.median(distance)), least_scale))
+
+
+def step(points: Floats, feet: Floats, normals: Floats, width: float) -> Pose:
+    """Return the small motion that brings points (n, 3) mm towards the tangent planes of their feet, Tukey-weighted."""
+    open3d = import_open3d()
+    geometry, registration = open3d.geometry, open3d.pipelines.registration
+    centre = points.mean(axis=0)
+    length = float(np.sqrt(((points - centre) ** 2).sum(axis=1).mean())) or 1.0
+    places, directions = _anchors(length)
+    source, target = geometry.PointCloud(), geometry.PointCloud()
+    vectors = open3d.utility.Vector3dVector
+    source.points = vectors(np.concatenate([points - centre, places]))
+    target.points = vectors(np.concatenate([feet - centre, places]))
+    target.normals = vectors(np.concatenate([normals, directions]))
+    pairs = np.repeat(np.arange(len(points) + len(places), dtype=np.int32)[:, None], 2, axis=1)
+    estimator = registration.TransformationEstimationPointToPlane(registration.TukeyLoss(width))
+    matrix = np.asarray(estimator.compute_transformation(source, target, open3d.utility.Vector2iVector(pairs)))
+    turned = Pose.from_matrix(matrix)
+    return Pose(turned.rotation, turned.translation + centre - turned.rotation @ centre)
+
+
+def _anchors(length: float) -> tuple[Floats, Floats]:
+    """Return twelve points (12, 3) at ±length on the axes and normals across: their normal matrix is diagonal."""
+    axes = np.eye(3)
+    pairs = [(side * length * axes[k], axes[j]) for k in range(3) for j in range(3) if j != k for side in (1.0, -1.0)]
+    places, directions = zip(*pairs, strict=True)
+    return np.array(places), np.array(directions)

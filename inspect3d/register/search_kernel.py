@@ -1,0 +1,177 @@
+"""Kernels of the pose search: the cost of many poses, and their descent, against the field of a surface.
+
+Arrays only. A pose is a rotation and a translation; poses come in stacks.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit, prange
+
+OPPOSED = 0.3  # normals whose cosine is below this do not belong to the same surface
+
+
+@njit(cache=True)
+def _look_up(point, origin, step, feet, normals, foot, normal):
+    """Write foot and normal of the cell nearest to the point; return the distance it is known to have at least."""
+    nx, ny, nz = feet.shape[0], feet.shape[1], feet.shape[2]
+    i = min(max(int((point[0] - origin[0]) / step + 0.5), 0), nx - 1)
+    j = min(max(int((point[1] - origin[1]) / step + 0.5), 0), ny - 1)
+    k = min(max(int((point[2] - origin[2]) / step + 0.5), 0), nz - 1)
+    across = 0.0
+    total = 0.0
+    for a in range(3):
+        foot[a] = feet[i, j, k, a]
+        normal[a] = normals[i, j, k, a]
+        gap = point[a] - foot[a]
+        across += gap * normal[a]
+        total += gap * gap
+    along = max(math.sqrt(max(total - across * across, 0.0)) - 0.87 * step, 0.0)
+    return math.sqrt(across * across + along * along)
+
+
+@njit(cache=True)
+def _agrees(turned, normal, oriented):
+    """Tell whether a measured normal may lie on a surface with this normal; a zero normal may lie on any."""
+    length = turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2]
+    if length < 0.25:
+        return True
+    cosine = turned[0] * normal[0] + turned[1] * normal[1] + turned[2] * normal[2]
+    return cosine > OPPOSED or (not oriented and cosine < -OPPOSED)
+
+
+@njit(cache=True)
+def _apply(rotation, translation, point, moved):
+    for a in range(3):
+        moved[a] = rotation[a, 0] * point[0] + rotation[a, 1] * point[1] + rotation[a, 2] * point[2] + translation[a]
+
+
+@njit(cache=True)
+def _cost(rotation, translation, points, point_normals, oriented, reach, origin, step, feet, normals):
+    moved, turned, foot, normal, zero = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.zeros(3)
+    cost = 0.0
+    for p in range(len(points)):
+        _apply(rotation, translation, points[p], moved)
+        distance = _look_up(moved, origin, step, feet, normals, foot, normal)
+        _apply(rotation, zero, point_normals[p], turned)
+        if distance < reach and _agrees(turned, normal, oriented):
+            cost += distance / reach
+        else:
+            cost += 1.0
+    return cost / len(points)
+
+
+@njit(parallel=True, cache=True)
+def costs(rotations, translations, points, point_normals, oriented, reach, origin, step, feet, normals):
+    """Return the mean of min(distance / reach, 1) for each pose (k,); normals that disagree cost 1."""
+    result = np.empty(len(rotations))
+    for h in prange(len(rotations)):
+        result[h] = _cost(
+            rotations[h], translations[h], points, point_normals, oriented, reach, origin, step, feet, normals
+        )
+    return result
+
+
+@njit(cache=True)
+def solve_spd(matrix, right):
+    """Return the solution of a small symmetric positive definite system, by Cholesky, in place of `matrix`."""
+    n = len(right)
+    for i in range(n):
+        for j in range(i + 1):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = math.sqrt(max(total, 1e-300)) if i == j else total / matrix[j, j]
+    for i in range(n):
+        for k in range(i):
+            right[i] -= matrix[i, k] * right[k]
+        right[i] /= matrix[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            right[i] -= matrix[k, i] * right[k]
+        right[i] /= matrix[i, i]
+    return right
+
+
+@njit(cache=True)
+def _rotation_of(vector, rotation):
+    """Write the rotation matrix of a rotation vector (Rodrigues)."""
+    angle = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    if angle < 1e-12:
+        s, c = 1.0, 0.5
+    else:
+        s, c = math.sin(angle) / angle, (1.0 - math.cos(angle)) / (angle * angle)
+    x, y, z = vector[0], vector[1], vector[2]
+    rotation[0, 0] = 1.0 - c * (y * y + z * z)
+    rotation[1, 1] = 1.0 - c * (x * x + z * z)
+    rotation[2, 2] = 1.0 - c * (x * x + y * y)
+    rotation[0, 1], rotation[1, 0] = c * x * y - s * z, c * x * y + s * z
+    rotation[0, 2], rotation[2, 0] = c * x * z + s * y, c * x * z - s * y
+    rotation[1, 2], rotation[2, 1] = c * y * z - s * x, c * y * z + s * x
+
+
+@njit(cache=True)
+def _descend(
+    rotation, translation, points, point_normals, oriented, reaches, centre, length, origin, step, feet, normals
+):
+    """Improve one pose in place: a truncated point-to-plane step for each reach."""
+    moved, turned, foot, normal, zero = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.zeros(3)
+    middle, row, turn, new = np.empty(3), np.empty(6), np.empty((3, 3)), np.empty((3, 3))
+    for reach in reaches:
+        matrix, right = np.zeros((6, 6)), np.zeros(6)
+        _apply(rotation, translation, centre, middle)
+        total = 0.0
+        for p in range(len(points)):
+            _apply(rotation, translation, points[p], moved)
+            distance = _look_up(moved, origin, step, feet, normals, foot, normal)
+            _apply(rotation, zero, point_normals[p], turned)
+            if distance >= reach or not _agrees(turned, normal, oriented):
+                continue
+            weight = (1.0 - (distance / reach) ** 2) ** 2
+            x, y, z = (moved[0] - middle[0]) / length, (moved[1] - middle[1]) / length, (moved[2] - middle[2]) / length
+            row[0], row[1], row[2] = (
+                y * normal[2] - z * normal[1],
+                z * normal[0] - x * normal[2],
+                x * normal[1] - y * normal[0],
+            )
+            row[3], row[4], row[5] = normal[0], normal[1], normal[2]
+            gap = 0.0
+            for a in range(3):
+                gap += (moved[a] - foot[a]) * normal[a]
+            total += weight
+            for a in range(6):
+                right[a] -= weight * row[a] * gap
+                for b in range(a + 1):
+                    matrix[a, b] += weight * row[a] * row[b]
+        if total < 6.0:
+            return
+        for a in range(6):
+            matrix[a, a] += 0.01 * total
+        motion = solve_spd(matrix, right)
+        for a in range(3):
+            motion[a] /= length
+        _rotation_of(motion[:3], turn)
+        for a in range(3):
+            zero[a] = 0.0
+            for b in range(3):
+                new[a, b] = turn[a, 0] * rotation[0, b] + turn[a, 1] * rotation[1, b] + turn[a, 2] * rotation[2, b]
+        for a in range(3):
+            for b in range(3):
+                rotation[a, b] = new[a, b]
+        _apply(rotation, zero, centre, moved)
+        for a in range(3):
+            translation[a] = middle[a] + motion[3 + a] - moved[a]
+
+
+@njit(parallel=True, cache=True)
+def descend(
+    rotations, translations, points, point_normals, oriented, reaches, centre, length, origin, step, feet, normals
+):
+    """Improve each pose of a stack in place by truncated point-to-plane steps, one for each of `reaches` (mm)."""
+    for h in prange(len(rotations)):
+        _descend(
+            rotations[h], translations[h], points, point_normals, oriented, reaches, centre, length,
+            origin, step, feet, normals,
+        )  # fmt: skip
