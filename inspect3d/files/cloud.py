@@ -84,7 +84,7 @@ def read_cloud(path: Path) -> CloudFile:
 def _cleaned(content: Content, found: Found) -> CloudFile:
     name = content.path.name
     remarks = [*content.remarks, *found.remarks]
-    finite = np.isfinite(found.points).all(axis=1)
+    finite = found.finite
     points, dropped = found.points[finite], np.count_nonzero(~finite)
     if not len(points):
         reason = f"its {dropped} points have no finite coordinates" if dropped else "it holds no points"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from inspect3d.arrays import Floats
 from inspect3d.files.content import Content
@@ -92,6 +91,8 @@ def _cartesian(distance: Floats, azimuth: Floats, elevation: Floats) -> Floats:
 
 def _pose(scan: Any) -> tuple[Floats, Floats]:
     """Return rotation (3, 3) and translation (3,) m of a scan; what the file leaves out is the identity."""
+    from scipy.spatial.transform import Rotation
+
     rotation, translation = np.eye(3), np.zeros(3)
     if scan.isDefined("pose/rotation"):
         x, y, z, w = (scan[f"pose/rotation/{name}"].value() for name in "xyzw")

@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from inspect3d.arrays import Floats, Integers
+from inspect3d.arrays import Booleans, Floats, Integers
+
+_FARTHEST = 1e18
 
 
 def _none() -> Integers:
@@ -35,3 +37,8 @@ class Found:
     parts: tuple[int, ...] = ()
     units: str | None = None
     remarks: tuple[str, ...] = ()
+
+    @property
+    def finite(self) -> Booleans:
+        """Tell which points have coordinates (n,); some programs write the largest number they have for none."""
+        return (np.abs(self.points) < _FARTHEST).all(axis=1)

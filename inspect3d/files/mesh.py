@@ -60,7 +60,7 @@ def read_mesh(path: Path) -> MeshFile:
     if not len(found.sizes):
         what = f"holds {len(found.points)} points but no triangles" if len(found.points) else "holds no triangles"
         raise content.refused(what, "Export it as a mesh.")
-    bad = np.count_nonzero(~np.isfinite(found.points).all(axis=1))
+    bad = np.count_nonzero(~found.finite)
     if bad:
         raise content.refused(f"has {bad} vertices whose coordinates are not finite")
     triangles = triangulated(content, found)
