@@ -112,7 +112,7 @@ def account(record: Record, part: MeasuredPart, values: Mapping[str, Any], ancho
     if not part.status.has_map or part.deviation is None:
         badge = part.status.value
         return Account(**shared, failed=True, badge=badge, badge_kind=badge, advice=advice(part))
-    verdict = verdict_words(record.nominal.mesh, part)
+    verdict = verdict_words(record, part)
     figures = _Figures(values["deviation"])
     first = part.alignments[0] if part.alignments else None
     judged = part.verdict is not None

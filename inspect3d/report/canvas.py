@@ -73,13 +73,13 @@ class Canvas:
     def measure(self, words: str, size: float, weight: str = "normal") -> float:
         """Return the width of words, px."""
         from matplotlib.font_manager import FontProperties
-        from matplotlib.textpath import TextPath
+        from matplotlib.textpath import text_to_path
 
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+            warnings.filterwarnings("ignore", message=r"Glyph .* missing", category=UserWarning)
             properties = FontProperties(family=_fonts(), weight=weight, size=size * self.unit)
-            path = TextPath((0, 0), words.replace("$", "S"), prop=properties)
-        return float(path.get_extents().width)
+            width, _, _ = text_to_path.get_text_width_height_descent(words, properties, ismath=False)
+        return float(width)
 
     def line(self, xs: list[float], ys: list[float], **style: Any) -> None:
         """Draw a line through points."""

@@ -24,8 +24,8 @@ def draw_colour_bar(canvas: Canvas, layout: Layout, scale: ColourScale, toleranc
         _draw_classes(canvas, scale, (left, width, top, bottom))
     else:
         _draw_values(canvas, scale, (left, width, top, bottom), tolerance)
-    _patch(canvas, left, layout.bottom - 22 * u, 46 * u, 26 * u, UNMEASURED)
-    canvas.text(left + width + 16 * u, layout.bottom - 9 * u, "not measured", 24, color=PALE)
+    _patch(canvas, layout.right + 32 * u, layout.bottom - 22 * u, 34 * u, 26 * u, UNMEASURED)
+    canvas.text(layout.right + 78 * u, layout.bottom - 9 * u, scale.rest, 24, color=PALE)
 
 
 def ticks(limits: Interval) -> Floats:

@@ -30,6 +30,7 @@ class ColourScale:
     limits : values of the two ends
     colours : (k, 3) uint8, evenly spaced between the limits; one per class where there are classes
     classes : words for the values 1, 2, ... of a field that has no numbers; empty for a field that has
+    rest : words for the grey of the other nodes
     """
 
     title: str
@@ -37,6 +38,7 @@ class ColourScale:
     limits: Interval
     colours: NDArray[np.uint8]
     classes: tuple[str, ...] = ()
+    rest: str = "not measured"
 
     def renamed(self, title: str, unit: str) -> ColourScale:
         """Return the same colours for another field."""
@@ -71,6 +73,11 @@ def verdict_scale() -> ColourScale:
     """Return the classes of a verdict: conform, undecided, nonconform."""
     colours = np.array(BAND_COLOURS[2:], dtype=np.uint8)
     return ColourScale("Verdict", "", (0.5, 3.5), colours, ("conform", "undecided", "nonconform"))
+
+
+def mark_scale(title: str, words: str) -> ColourScale:
+    """Return one colour for the nodes that are marked; the others are grey."""
+    return ColourScale(title, "", (0.5, 1.5), np.array(BAND_COLOURS[:1], dtype=np.uint8), (words,), rest=f"not {words}")
 
 
 def symmetric_limits(values: Floats, areas: Floats) -> Interval:

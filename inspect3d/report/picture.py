@@ -60,17 +60,17 @@ class Picture:
 
     def taken(self, window: Scene, viewpoint: Viewpoint) -> Canvas:
         """Return the sheet with the part as it is seen from a viewpoint."""
-        drawing, layout = window.draw(viewpoint), self.layout
+        (image, sight), layout = window.draw(viewpoint), self.layout
         canvas = Canvas(layout.width, layout.height)
-        canvas.picture(layout.column, layout.top, drawing.image)
+        canvas.picture(layout.column, layout.top, image)
         self.caption.write(canvas)
         if self.scale is not None:
             draw_colour_bar(canvas, layout, self.scale, self.tolerance)
-        draw_compass(canvas, layout, drawing.axes, drawing.pixel, f"seen from {viewpoint.words}")
+        draw_compass(canvas, layout, sight.axes, sight.pixel, f"seen from {viewpoint.words}")
         nodes = [reading.node for reading in self.flagged if reading.node is not None]
         if nodes:
-            seen = drawing.sees(self.mesh.nodes[nodes], self.mesh.normals[nodes])
-            pixels = drawing.pixels(self.mesh.nodes[nodes])[seen] + 0.5 + [layout.column, layout.top]
+            seen = sight.sees(self.mesh.nodes[nodes], self.mesh.normals[nodes])
+            pixels = sight.pixels(self.mesh.nodes[nodes])[seen] + 0.5 + [layout.column, layout.top]
             with_node = [reading for reading in self.flagged if reading.node is not None]
             draw_flags(canvas, layout, [with_node[k] for k in np.flatnonzero(seen)], pixels)
         return canvas

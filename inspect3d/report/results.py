@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from inspect3d.compare.tolerances import tolerances
 from inspect3d.deviate.statistics import Statistics, percentiles
 from inspect3d.nominal.nominal import InspectionMesh
 from inspect3d.record import MeasuredPart, Record
@@ -46,19 +47,21 @@ def as_json(values: Mapping[str, Any]) -> str:
     return _text(_plain(values), "") + "\n"
 
 
-def verdict_shares(mesh: InspectionMesh, part: MeasuredPart) -> dict[str, float] | None:
+def verdict_shares(record: Record, part: MeasuredPart) -> dict[str, float] | None:
     """Return the shares of the area that conform, are undecided, do not conform or were not measured; their sum is 1.
 
-    Creases have no deviation and count as not measured. Observed nodes without a tolerance are left out. None where
-    the measurement was not judged.
+    The area is that of the nodes for which there is a tolerance. Creases have no deviation and count as not measured.
+    None where the measurement was not judged.
     """
-    if part.deviation is None or part.verdict is None:
+    mesh, limits = record.nominal.mesh, tolerances(record.recipe.part, record.nominal.mesh)
+    if part.deviation is None or part.verdict is None or limits is None:
         return None
-    verdict = np.asarray(part.verdict)
-    area = {name: mesh.areas[verdict == k].sum() for k, name in enumerate(VERDICTS, start=1)}
-    area["unmeasured"] = mesh.areas[~part.deviation.observed].sum()
-    whole = sum(area.values())
-    return {name: float(value / whole) for name, value in area.items()} if whole > 0 else None
+    areas = np.where(np.isnan(limits).any(axis=1), 0.0, mesh.areas)
+    if not areas.sum() > 0:
+        return None
+    verdict = np.where(part.deviation.observed, part.verdict, 0)
+    kinds = (*VERDICTS, "unmeasured")
+    return {name: float(areas[verdict == k % 4].sum() / areas.sum()) for k, name in enumerate(kinds, start=1)}
 
 
 def _part(record: Record) -> dict[str, Any]:
@@ -86,7 +89,7 @@ def _measurement(record: Record, mesh: InspectionMesh, part: MeasuredPart) -> di
         "reason": part.reason,
         "alignment": _alignment(part) if has_map else _no_alignment(part),
         "deviation": _deviation(mesh, part) if has_map else None,
-        "verdict": verdict_shares(mesh, part) if has_map else None,
+        "verdict": verdict_shares(record, part) if has_map else None,
         "labels": [_label(reading) for reading in readings(mesh, part, record.recipe.report.labels)],
         "noise": part.noise,
         "hidden": [],

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.report.colours import BACK, UNMEASURED, ColourScale
+from inspect3d.report.sight import Sight
 from inspect3d.report.triangulated import triangulated
 from inspect3d.report.viewpoint import Viewpoint
 
@@ -19,75 +20,50 @@ if TYPE_CHECKING:
     from pyvista import Plotter, PolyData
 
 LINES = "#3a3f47"
+FILL = 0.96
+"""Share of the window that the part takes."""
 SHARP = 30.0
 """Degrees between facets from which an edge is drawn."""
 
 
 @dataclass(frozen=True, eq=False)
-class Drawing:
-    """A picture of the part, and where points of the part lie in it.
+class Scene:
+    """An open window nobody sees; draws the same part from many sides.
 
     Parameters
     ----------
-    image : (height, width, 3) uint8
-    nearness : (height, width) mm, of what is seen, towards the eye from the scene's centre; NaN beside the part
-    axes : (3, 3) rows right, up, towards the eye
-    centre : (3,) mm, the point in the middle of the picture
-    pixel : mm per pixel
+    plotter : the window
+    nodes : (n, 3) mm, of the part
     """
 
-    image: NDArray[np.uint8]
-    nearness: Floats
-    axes: Floats
-    centre: Floats
-    pixel: float
-
-    def pixels(self, points: Floats) -> Floats:
-        """Return the pixels (n, 2) of points (n, 3) mm: right and down from the corner at the top left."""
-        height, width = self.nearness.shape
-        right, up, _ = self.axes @ (points - self.centre).T / self.pixel
-        return np.column_stack([width / 2 - 0.5 + right, height / 2 - 0.5 - up])
-
-    def sees(self, points: Floats, normals: Floats) -> Booleans:
-        """Tell which points (n, 3) mm of the surface face the eye and are not hidden, (n,)."""
-        height, width = self.nearness.shape
-        column, row = np.round(self.pixels(points)).astype(np.int64).T
-        inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
-        cosine = normals @ self.axes[2]
-        nearness = (points - self.centre) @ self.axes[2]
-        slope = np.sqrt(1 / np.clip(cosine, 0.1, 1.0) ** 2 - 1)
-        seen = self.nearness[row.clip(0, height - 1), column.clip(0, width - 1)]
-        return inside & (cosine > 0.1) & ~(nearness < seen - self.pixel * (2 + 2 * slope))
-
-
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """An open window nobody sees; draws the same part from many sides."""
-
     plotter: Plotter
-    centre: Floats
-    corners: Floats
+    nodes: Floats
 
-    def draw(self, viewpoint: Viewpoint, fill: float = 0.96) -> Drawing:
-        """Return the picture from a viewpoint, the part filling that share of the window."""
+    def draw(self, viewpoint: Viewpoint) -> tuple[NDArray[np.uint8], Sight]:
+        """Return the picture from a viewpoint, (height, width, 3), and where points of the part lie in it."""
+        sight = self.sight(viewpoint)
+        image = np.asarray(self.plotter.screenshot(return_img=True))
+        return np.ascontiguousarray(image[..., :3]), sight
+
+    def sight(self, viewpoint: Viewpoint) -> Sight:
+        """Return what is seen from a viewpoint, the part filling the window."""
         width, height = self.plotter.window_size
         axes = viewpoint.axes
-        right, up, near = axes @ (self.corners - self.centre).T
-        pixel = max(np.ptp(right) / width, np.ptp(up) / height) / fill or 1.0
-        middle = [(span.max() + span.min()) / 2 for span in (right, up, near)]
-        centre = self.centre + middle @ axes
-        far = float(np.linalg.norm(self.corners - self.centre, axis=1).max()) * 4 or 1.0
+        spans = axes @ self.nodes.T
+        low, high = spans.min(axis=1), spans.max(axis=1)
+        centre = (low + high) / 2 @ axes
+        pixel = float(max((high - low)[:2] / (width, height)) / FILL) or 1.0
+        far = float(np.linalg.norm(high - low)) * 2 or 1.0
         camera = self.plotter.camera
         camera.parallel_projection = True
         camera.focal_point = tuple(centre)
         camera.position = tuple(centre + far * axes[2])
         camera.up = tuple(axes[1])
         camera.parallel_scale = pixel * height / 2
-        camera.clipping_range = (far * 0.25, far * 1.75)
+        self.plotter.renderer.ResetCameraClippingRange()
         self.plotter.render()
-        image = np.ascontiguousarray(np.asarray(self.plotter.screenshot(return_img=True))[..., :3])
-        nearness = far + np.asarray(self.plotter.get_image_depth(fill_value=np.nan), dtype=np.float64)
-        return Drawing(image, nearness, axes, centre, float(pixel))
+        depth = self.plotter.get_image_depth(fill_value=np.nan, reset_camera_clipping_range=False)
+        return Sight(far + np.asarray(depth, dtype=np.float64), axes, centre, pixel)
 
 
 @contextmanager
@@ -122,8 +98,8 @@ def scene(
         edges = surface.extract_feature_edges(SHARP, non_manifold_edges=False, manifold_edges=False)
         if edges.n_cells:
             plotter.add_mesh(edges, color=LINES, line_width=1.2, lighting=False)
-        centre = (nodes.min(axis=0) + nodes.max(axis=0)) / 2
-        yield Scene(plotter, centre, np.asarray(nodes))
+        plotter.show(auto_close=False)
+        yield Scene(plotter, np.asarray(nodes))
     finally:
         plotter.close()
 

@@ -15,6 +15,7 @@ from inspect3d.recipe import Interval
 from inspect3d.report.colours import (
     ColourScale,
     deviation_scale,
+    mark_scale,
     rising_limits,
     rising_scale,
     symmetric_limits,
@@ -28,6 +29,7 @@ from inspect3d.report.viewpoint import Viewpoint
 if TYPE_CHECKING:
     from pyvista import PolyData
 
+MARKS = {"observed": "measured", "crease": "on an edge"}
 LEAST = 200
 """Pixels of a side below which the words on a picture are not readable."""
 
@@ -76,7 +78,7 @@ def screenshot(
     caption = Caption(str(results["part"]["name"]), f"{name}: {_words(field)}")
     tolerance = results["part"].get("tolerance") if field == "deviation" else None
     picture = Picture(mesh, Layout(*size), caption, scale, tolerance=tuple(tolerance) if tolerance else None)
-    if field == "verdict":
+    if scale.classes:
         values = np.where(values == 0, np.nan, values)
     with scene(mesh.nodes, mesh.triangles, values, scale, picture.layout.window) as window:
         canvas = picture.taken(window, viewpoint)
@@ -139,6 +141,8 @@ def _mesh(polydata: PolyData) -> InspectionMesh:
 def _scale(field: str, values: Floats, mesh: InspectionMesh, limits: Interval | None) -> ColourScale:
     if field == "verdict":
         return verdict_scale()
+    if field in MARKS:
+        return mark_scale(field.capitalize(), MARKS[field])
     shown = np.isfinite(values)
     values, areas = values[shown], mesh.areas[shown]
     if field == "deviation" or (len(values) and values.min() < 0):

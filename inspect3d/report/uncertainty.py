@@ -8,6 +8,7 @@ import numpy as np
 
 from inspect3d.arrays import Floats
 from inspect3d.nominal.nominal import InspectionMesh
+from inspect3d.recipe import MeasurementTable
 from inspect3d.record import MeasuredPart, Record
 from inspect3d.register.alignment import Alignment
 from inspect3d.report.digits import COVERAGE, significant
@@ -64,33 +65,45 @@ def _of_the_points(record: Record, part: MeasuredPart) -> list[Contribution]:
         found.append(Contribution("noise of the points", _micro(part.noise), words))
     if part.alignments and part.deviation is not None:
         sigma = pose_sigma(record.nominal.mesh, part.alignments[0])[part.deviation.observed]
-        words = "median of what the covariance of the alignment means at a node; shared by all nodes"
+        words = "median of what the covariance of the pose means at a node; "
+        words += (
+            "for comparison: the map is known up to a best fit to the same points, and so are its uncertainties"
+            if _table(record, part).alignment.refine
+            else "shared by all nodes"
+        )
         found.append(Contribution("alignment", _micro(float(np.median(sigma))), words))
     if record.nominal.chord > 0:
-        words = "largest distance between the triangles that stand for the CAD surface and the surface itself"
-        found.append(Contribution("CAD tessellation", _micro(record.nominal.chord), words))
+        chord = record.nominal.chord
+        words = (
+            f"the triangles that stand for the CAD surface lie up to {_micro(chord)} off it; rectangular distribution"
+        )
+        found.append(Contribution("CAD tessellation", _micro(chord / np.sqrt(12.0)), words))
     return found
 
 
 def _of_the_surroundings(record: Record, part: MeasuredPart) -> list[Contribution]:
     found = []
-    coating = next((table.coating for table in record.recipe.measurements if table.name == part.name), None)
+    coating = _table(record, part).coating
     if coating is not None:
-        words = f"of the paint; its thickness of {_micro(coating.thickness)} is subtracted"
+        words = f"of the thickness of the paint, {_micro(coating.thickness)}, which is subtracted; shared by all nodes"
         found.append(Contribution("coating", _micro(coating.sigma), words))
     budget = record.recipe.report.budget
     if budget.calibration > 0:
-        words = "standard uncertainty of the instrument's calibration"
+        words = "of the instrument; shared by all nodes"
         found.append(Contribution("calibration", _micro(budget.calibration), words))
-    if budget.expansion > 0:
+    if budget.expansion != 0 and budget.temperature != REFERENCE:
         warmer = budget.temperature - REFERENCE
         size = float(np.linalg.norm(np.ptp(record.nominal.mesh.nodes, axis=0)))
         words = (
-            f"the part at {budget.temperature:g} °C instead of 20 °C, over its diagonal of {size:.0f} mm, "
-            f"at {significant(1e6 * budget.expansion, 3)} µm per metre and kelvin"
+            f"corrected, and no uncertainty: what {budget.temperature:g} °C instead of 20 °C mean over the diagonal of "
+            f"{size:.0f} mm, at {significant(1e6 * budget.expansion, 3)} µm per metre and kelvin"
         )
         found.append(Contribution("temperature", _micro(abs(budget.expansion * warmer) * size), words))
     return found
+
+
+def _table(record: Record, part: MeasuredPart) -> MeasurementTable:
+    return next(table for table in record.recipe.measurements if table.name == part.name)
 
 
 def _micro(length: float) -> str:

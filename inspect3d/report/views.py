@@ -37,7 +37,7 @@ class Views:
         cosine = np.zeros((len(viewpoints), len(mesh)))
         with scene(mesh.nodes, mesh.triangles, np.full(len(mesh), np.nan), None, (400, 400)) as window:
             for k, viewpoint in enumerate(viewpoints):
-                seen = window.draw(viewpoint).sees(mesh.nodes, mesh.normals)
+                seen = window.sight(viewpoint).sees(mesh.nodes, mesh.normals)
                 cosine[k] = np.where(seen, mesh.normals @ viewpoint.direction, 0.0)
         return cls(viewpoints, cosine)
 
