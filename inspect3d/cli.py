@@ -134,7 +134,7 @@ def screenshot(
     file: Annotated[Path, typer.Option("--output", "-o", help="The picture to write.")] = Path("screenshot.png"),
     name: Annotated[str | None, typer.Option(help="The measurement; default: the first.")] = None,
     field: Annotated[str, typer.Option(help="deviation, sigma, verdict, ...")] = "deviation",
-    view: Annotated[str, typer.Option(help="iso, front, back, left, right, top, bottom.")] = "iso",
+    view: Annotated[str, typer.Option(help="iso, front, top, +x, -y+z, ...")] = "iso",
     size: Annotated[tuple[int, int], typer.Option(help="Width and height, pixels.")] = (1600, 1200),
     limits: Annotated[tuple[float, float] | None, typer.Option(help="Ends of the colour bar.")] = None,
 ) -> None:

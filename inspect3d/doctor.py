@@ -25,7 +25,7 @@ PATIENCE = 120.0
 MODULES = {
     "cadquery-ocp-novtk": "OCP",
     "opencv-python-headless": "cv2",
-    "trame-vtk": "trame.modules.vtk",
+    "vtk": "vtkmodules",
 }
 """The packages that are imported under another name than their own."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import shlex
@@ -14,6 +15,7 @@ from shutil import copy, copytree, ignore_patterns
 
 import pytest
 
+from inspect3d.doctor import MODULES
 from inspect3d.recipe import load_recipe
 
 ROOT = Path(__file__).parents[1]
@@ -141,3 +143,29 @@ def test_the_wheel_holds_packages_plugins_templates_and_entry_points(tmp_path):
     where, *names = ended.stdout.split()
     assert Path(where).is_relative_to(target)
     assert set(names) >= set(PROJECT["project"]["entry-points"]["inspect3d.measurements"])
+
+
+BY_NAME = {"open3d", "libusb-package"}
+"""Packages that `inspect3d.system` loads by their name."""
+
+AHEAD = {"opencv-python-headless", "pycolmap"}
+"""Packages of the stereo methods, which are on their way."""
+
+SILENT = {"networkx"}
+"""Packages that others use where they are installed."""
+
+
+def imported_packages(path: Path) -> set[str]:
+    """Return the packages a module imports anywhere, by the names pip knows them under."""
+    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    names |= {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
+    foreign = {name.split(".")[0] for name in names} - sys.stdlib_module_names - {"inspect3d", "inspect3d_plugins"}
+    distribution = {module: name for name, module in MODULES.items()}
+    return {distribution.get(name, name.replace("_", "-")) for name in foreign}
+
+
+def test_every_package_that_is_imported_is_declared_and_the_other_way_round():
+    modules = [*(ROOT / "inspect3d").rglob("*.py"), *(ROOT / "plugins").rglob("*.py")]
+    used = set().union(*map(imported_packages, modules)) - {"pydantic-core"} | BY_NAME | AHEAD | SILENT
+    assert used == {re.split(r"[^\w-]", line, maxsplit=1)[0] for line in PROJECT["project"]["dependencies"]}
