@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from inspect3d.deviate.deviation import Deviation
 from inspect3d.deviate.statistics import Statistics
-from inspect3d.record import MeasuredPart, Record
+from inspect3d.nominal.nominal import InspectionMesh
+from inspect3d.record import Record
 
 
 def summary(record: Record, out: Path) -> Iterator[str]:
@@ -16,17 +18,15 @@ def summary(record: Record, out: Path) -> Iterator[str]:
     for part in record.parts:
         yield f"{part.name} ({part.method}): {part.reason or part.status.words}"
         if part.deviation is not None:
-            yield f"    {_figures(part, record)}"
+            yield f"    {_figures(part.deviation, record.nominal.mesh)}"
     yield from (f"warning: {warning}" for warning in record.warnings)
     yield f"report: {out / 'report.html'}"
 
 
-def _figures(part: MeasuredPart, record: Record) -> str:
-    deviation, mesh = part.deviation, record.nominal.mesh
-    assert deviation is not None
+def _figures(deviation: Deviation, mesh: InspectionMesh) -> str:
     observed = deviation.observed
     if not observed.any():
-        return "no node was observed"
+        return f"none of {len(mesh)} nodes was observed"
     figures = Statistics.of(deviation.value[observed], mesh.areas[observed])
     sigma = np.median(deviation.sigma[observed])
     nodes = f"{np.count_nonzero(observed)} of {len(mesh)} nodes observed"

@@ -10,12 +10,19 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import inspect3d
 from inspect3d import cli
-from inspect3d.outcome import InputError, MeasurementError
+from inspect3d.deviate.deviation import Deviation
+from inspect3d.nominal.nominal import InspectionMesh, Nominal
+from inspect3d.nominal.surface import Surface
+from inspect3d.outcome import InputError, MeasurementError, Status
 from inspect3d.progress import Progress
+from inspect3d.recipe import Recipe
+from inspect3d.record import MeasuredPart, Record
+from inspect3d.summary import summary
 from inspect3d.terminal import terminal
 
 COMMANDS = ("run", "demo", "check", "methods", "screenshot", "virtual", "doctor")
@@ -161,6 +168,45 @@ def test_a_terminal_shows_running_stages_with_their_bar():
         progress.update(0.5)
         time.sleep(0.3)
     assert "laser: registering" in screen.getvalue()
+
+
+@pytest.fixture
+def square() -> Nominal:
+    """Return a square of two triangles, 2 mm wide."""
+    nodes = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3]])
+    up = np.tile([0.0, 0, 1], (4, 1))
+    mesh = InspectionMesh(nodes, triangles, up, np.zeros(4, dtype=bool), np.full(4, -1))
+    return Nominal("square", Surface(nodes, triangles), mesh)
+
+
+def test_a_finished_inspection_is_summed_up_by_status_figures_and_report(square):
+    recipe = Recipe.model_validate(
+        {
+            "schema": 1,
+            "part": {"name": "square", "cad": "square.stl"},
+            "measurements": [{"name": "laser", "method": "scan"}],
+        }
+    )
+    value, sigma = np.array([0.1, 0.1, 0.1, np.nan]), np.array([0.02, 0.01, 0.03, np.nan])
+    unseen = np.full(4, np.nan)
+    parts = (
+        MeasuredPart("laser", "scan", "Scan()", Status.OK, deviation=Deviation(value, sigma, np.isfinite(value))),
+        MeasuredPart(
+            "blind", "scan", "Scan()", Status.OK, deviation=Deviation(unseen, unseen, np.zeros(4, dtype=bool))
+        ),
+        MeasuredPart("lost", "scan", "Scan()", Status.FAILED, reason="The scan does not fit."),
+    )
+    record = Record(recipe, square, parts, (), {}, ("There is no PDF yet.",))
+    assert list(summary(record, Path("out"))) == [
+        f"laser (scan): {Status.OK.words}",
+        "    mean +0.1000 mm, std 0.0000 mm, median sigma 0.0200 mm; 3 of 4 nodes observed",
+        f"blind (scan): {Status.OK.words}",
+        "    none of 4 nodes was observed",
+        "lost (scan): The scan does not fit.",
+        "warning: There is no PDF yet.",
+        f"report: {Path('out') / 'report.html'}",
+    ]
 
 
 def test_a_picture_of_a_folder_without_results_is_refused(called, tmp_path):
