@@ -107,12 +107,18 @@ class Surface:
     def face_normals(self) -> Floats:
         """Return the unit normal of each triangle, (m, 3); zero where it has no area.
 
-        A triangle lower than 1e-13 of its longest side counts as one: its normal would be made of rounding errors.
+        A triangle lower than 1e-13 of its longest side counts as one: its normal would be made of rounding errors. The
+        cross product of a needle leans along it; taking that out keeps distances to its plane exact to rounding.
         """
-        corners = self._corners
-        longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
-        flat = np.linalg.norm(self._cross, axis=1) <= FLATNESS * longest**2
-        return np.where(flat[:, None], 0.0, unit(self._cross))
+        sides = np.roll(self._corners, -1, axis=1) - self._corners
+        lengths = np.linalg.norm(sides, axis=2)
+        longest = lengths.argmax(axis=1)[:, None]
+        length = np.take_along_axis(lengths, longest, axis=1)
+        along = unit(np.take_along_axis(sides, longest[:, :, None], axis=1)[:, 0])
+        flat = np.linalg.norm(self._cross, axis=1, keepdims=True) <= FLATNESS * length**2
+        normals = unit(self._cross)
+        normals = unit(normals - np.einsum("ij,ij->i", normals, along)[:, None] * along)
+        return np.where(flat, 0.0, normals)
 
     @cached_property
     def vertex_normals(self) -> Floats:
