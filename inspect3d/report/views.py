@@ -44,16 +44,17 @@ class Views:
     def showing(self, observed: Booleans, areas: Floats, marked: Sequence[int] = ()) -> tuple[Viewpoint, ...]:
         """Return up to four viewpoints that show the observed area best, and further ones for marked nodes left out.
 
+        Where nothing was observed it is the one that shows most of the part.
+
         A patch counts with its best foreshortening over the pictures taken; each viewpoint in turn is the one that
         adds most (greedy, hence within 1 - 1/e of the best choice: Nemhauser, Wolsey, Fisher, "An analysis of
         approximations for maximizing submodular set functions", 1978).
         """
-        weights = np.where(observed, areas, 0.0)
-        if not weights.sum() > 0:
-            weights = areas
+        most = MOST if areas[observed].sum() > 0 else 1
+        weights = np.where(observed, areas, 0.0) if most > 1 else areas
         chosen: list[int] = []
         best = np.zeros(self.cosine.shape[1])
-        while len(chosen) < MOST:
+        while len(chosen) < most:
             gain = (np.maximum(self.cosine, best) - best) @ weights
             k = int(gain.argmax())
             if chosen and gain[k] < WORTH * weights.sum():
