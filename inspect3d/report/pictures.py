@@ -84,7 +84,7 @@ def sigma_scale(record: Record, part: MeasuredPart) -> ColourScale:
 
 def _draw_part(record: Record, folder: Path, views: Views) -> Shown:
     mesh = record.nominal.mesh
-    viewpoint = views.showing(np.ones(len(mesh), dtype=bool), mesh.areas)[0]
+    viewpoint = views.overview(mesh.areas)
     size = " × ".join(number(length, 1) for length in np.ptp(mesh.nodes, axis=0))
     edge = number(mesh.edge_length, 2)
     caption = Caption(

@@ -41,6 +41,11 @@ class Views:
                 cosine[k] = np.where(seen, mesh.normals @ viewpoint.direction, 0.0)
         return cls(viewpoints, cosine)
 
+    def overview(self, areas: Floats) -> Viewpoint:
+        """Return the corner of the surrounding cube from which most of the part is seen."""
+        seen = (self.cosine @ areas) * [np.count_nonzero(np.abs(view.direction) > 0.1) == 3 for view in self.viewpoints]
+        return self.viewpoints[int(seen.argmax())]
+
     def showing(self, observed: Booleans, areas: Floats, marked: Sequence[int] = ()) -> tuple[Viewpoint, ...]:
         """Return up to four viewpoints that show the observed area best, and further ones for marked nodes left out.
 
