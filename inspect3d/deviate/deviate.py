@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -65,7 +65,7 @@ class Deviate:
     steps : of the alignment at the most
     """
 
-    to_node: CloudToNode = CloudToNode()
+    to_node: CloudToNode = field(default_factory=CloudToNode)
     refine: bool = True
     reach: float | None = None
     coating: float = 0.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -26,20 +26,20 @@ class BlindStart:
     kept : of those, refined on all
     """
 
-    search: PoseSearch = PoseSearch()
+    search: PoseSearch = field(default_factory=PoseSearch)
     tried: int = 24
-    kept: int = 10
+    kept: int = 8
 
-    def __call__(self, cloud: Thinned, smooth: Smooth, field: Field) -> Choice:
+    def __call__(self, cloud: Thinned, smooth: Smooth, grid: Field) -> Choice:
         """Return the pose cad_from_cloud the points choose, with its equals, its rivals and the others."""
         surface = smooth.surface
         size = surface.diagonal
-        poses = self.search(cloud, surface, field)[: self.tried]
-        few = cloud.every(3)
+        poses = self.search(cloud, surface, grid)[: self.tried]
+        few = cloud.every(4)
         rough = RobustIcp(steps=12, first_width=0.03 * size)
         poses = _ranked([rough(few, surface, pose) for pose in poses], 3e-3 * size)
         poses = distinct(poses, cloud.points, 0.01 * size)[: self.kept]
-        poses = _ranked([RobustIcp()(cloud, surface, pose) for pose in poses], 3e-3 * size)
+        poses = _ranked([RobustIcp(steps=40, still=0.01)(cloud, surface, pose) for pose in poses], 3e-3 * size)
         poses = distinct(poses, cloud.points, 0.005 * size)
         return choose([fitted(cloud, surface, pose) for pose in poses], smooth, cloud.points)
 

@@ -150,7 +150,7 @@ class Register:
         return fit.pose
 
     def _fine(self, cloud: Cloud, start: Pose) -> Pose:
-        return RobustIcp()(thinned(cloud, MANY), self.nominal.surface, start).pose
+        return RobustIcp(still=0.01)(thinned(cloud, MANY), self.nominal.surface, start).pose
 
     @staticmethod
     def _status(choice: Choice) -> Status:

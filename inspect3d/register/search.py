@@ -33,9 +33,9 @@ class PoseSearch:
     seed : of the guesses
     """
 
-    guesses: int = 200_000
-    kept: int = 600
-    judges: int = 150
+    guesses: int = 80_000
+    kept: int = 400
+    judges: int = 100
     near: float = 0.05
     reaches: tuple[float, float] = (0.10, 0.015)
     steps: int = 30
