@@ -24,7 +24,7 @@ _WANTED = {
 }
 
 
-def complaint(error: ValidationError, data: Any, model: type[BaseModel] | None = None) -> str:
+def complaint(error: ValidationError, data: Any, model: type[BaseModel] | None = None, where: str = "") -> str:
     """Return what is wrong first and where: a sentence.
 
     Parameters
@@ -32,10 +32,17 @@ def complaint(error: ValidationError, data: Any, model: type[BaseModel] | None =
     error : what pydantic found; unknown keys go first, since a misspelt key is also a missing one
     data : what was checked, to name tables by their `name`
     model : what it was checked against, to find the nearest right key
+    where : the place of the data in the recipe, such as "measurements['laser']"
     """
     found = sorted(error.errors(), key=lambda detail: detail["type"] != "extra_forbidden")
-    sentence = _sentence(found[0], data, model)
+    place, reason = _place_and_reason(found[0], data, model)
+    sentence = ": ".join(filter(None, [within(where, place), reason]))
     return sentence if sentence.endswith("?") else f"{sentence}."
+
+
+def within(where: str, place: str) -> str:
+    """Return a place inside another one, as a recipe writes it; either may be empty."""
+    return f"{where}.{place}" if where and place else where or place
 
 
 def unknown(key: str, known: Iterable[str]) -> str:
@@ -45,14 +52,13 @@ def unknown(key: str, known: Iterable[str]) -> str:
     return f"unknown key; did you mean {near[0]}?" if near else f"unknown key; known are {', '.join(known)}"
 
 
-def _sentence(detail: ErrorDetails, data: Any, model: type[BaseModel] | None) -> str:
+def _place_and_reason(detail: ErrorDetails, data: Any, model: type[BaseModel] | None) -> tuple[str, str]:
     kind, where = detail["type"], detail["loc"]
     if kind == "missing" and isinstance(where[-1], int):
-        return f"{_place(where[:-1], data)}: too few values, {len(detail['input'])}"
+        return _place(where[:-1], data), f"too few values, {len(detail['input'])}"
     if kind == "extra_forbidden":
-        return f"{_place(where, data)}: {unknown(str(where[-1]), _keys(where[:-1], model))}"
-    place = _place(where, data)
-    return f"{place}: {_reason(detail)}" if place else _reason(detail)
+        return _place(where, data), unknown(str(where[-1]), _keys(where[:-1], model))
+    return _place(where, data), _reason(detail)
 
 
 def _reason(detail: ErrorDetails) -> str:
@@ -84,7 +90,7 @@ def _place(where: tuple[int | str, ...], data: Any) -> str:
         if isinstance(step, str):
             if not (isinstance(data, Mapping) and (step in data or position == len(where) - 1)):
                 break
-            place += f".{step}" if place else step
+            place = within(place, step)
             data = data.get(step)
         elif isinstance(data, list | tuple) and step < len(data):
             data = data[step]

@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from inspect3d.complaint import complaint, unknown
+from inspect3d.complaint import complaint, unknown, within
 from inspect3d.measure import Measure
 from inspect3d.outcome import InputError
 from inspect3d.recipe import FILE_KEYS, MeasurementTable
@@ -86,12 +86,11 @@ def build(name: str, settings: Mapping[str, Any], where: str = "") -> Measure:
     for key in settings:
         if key not in known:
             wrong = unknown(key, [*known, *MeasurementTable.model_fields, *FILE_KEYS])
-            raise InputError(f"{where}.{key}: {wrong}" if where else f"{key}: {wrong}")
+            raise InputError(f"{within(where, key)}: {wrong}")
     try:
         return TypeAdapter(plugin).validate_json(json.dumps(settings, default=str, allow_nan=False), strict=True)
     except ValidationError as error:
-        complained = complaint(error, settings)
-        raise InputError(f"{where}.{complained}" if where else complained) from error
+        raise InputError(complaint(error, settings, where=where)) from error
     except ValueError as error:
         raise InputError(f"{place}a setting of the method {name!r} is not a finite number.") from error
 

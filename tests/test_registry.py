@@ -38,6 +38,10 @@ class Probe:
     kind: str = "ruby"
     offsets: tuple[float, ...] = ()
 
+    def __post_init__(self) -> None:
+        if self.radius < 0:
+            raise ValueError(f"the radius is not negative, as {self.radius} is")
+
     def open(self, files: Files) -> None:
         """Read nothing."""
 
@@ -167,6 +171,7 @@ def test_settings_become_the_method(offer):
     [
         ({}, "laser.radius: missing"),
         ({"radius": "2"}, 'laser.radius: wants a number, not "2"'),
+        ({"radius": -1}, "laser: the radius is not negative, as -1.0 is."),
         ({"radius": float("nan")}, "laser: a setting of the method 'probe' is not a finite number"),
         ({"radius": 1.0, "raidus": 1.0}, "laser.raidus: unknown key; did you mean radius?"),
         ({"radius": 1.0, "reech": 1.0}, "laser.reech: unknown key; did you mean reach?"),
