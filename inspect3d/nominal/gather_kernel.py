@@ -82,7 +82,7 @@ def _touches(point, record, tolerance, near):
 @njit(cache=True)
 def _angle(record, near):
     """Return the angle a triangle takes up around a point on it that is near to the given edges."""
-    count = near[0] + near[1] + near[2]
+    count = int(near[0]) + int(near[1]) + int(near[2])
     if count == 3:
         return 0.0
     if count < 2:

@@ -55,9 +55,9 @@ def _first(ray, reach, tree, stack, lengths):
         packet = links[node, 1]
         _write_lengths(ray, tree.packets[packet], tree.packets.shape[2], lengths)
         for lane in range(LANES):
-            member = tree.members[packet, lane]
-            if lengths[lane] < least or (lengths[lane] == least and (triangle < 0 or member < triangle)):
-                least, triangle = lengths[lane], member
+            member, length = tree.members[packet, lane], lengths[lane]
+            if length < least or (length == least and length < np.inf and (triangle < 0 or member < triangle)):
+                least, triangle = length, member
     return least if triangle >= 0 else np.inf, triangle
 
 

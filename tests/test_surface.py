@@ -1,0 +1,438 @@
+"""The closest point of a surface, and on which side of it one is, against brute force and exact truths."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from inspect3d.nominal.surface import Surface
+
+
+def turned(mesh, seed):
+    """Return vertices and triangles of a mesh, turned and shifted at random."""
+    rng = np.random.default_rng(seed)
+    rotation = Rotation.random(rng=rng).as_matrix()
+    return np.asarray(mesh.vertices) @ rotation.T + rng.normal(size=3) * 30, np.asarray(mesh.faces, dtype=np.int64)
+
+
+def wedge(angle):
+    """Return a knife: 80 mm long, 20 mm high, with an edge of `angle` degrees."""
+    half = 20 * np.tan(np.radians(angle) / 2)
+    profile = np.array([[0, 0], [20, half], [20, -half]])
+    vertices = np.concatenate([np.column_stack([np.full(3, x), profile]) for x in (-40.0, 40.0)])
+    return convex(vertices)
+
+
+def convex(vertices):
+    """Return the hull with long, thin triangles as they come."""
+    return trimesh.convex.convex_hull(np.asarray(vertices, dtype=float), qhull_options="QbB Pp Qt")
+
+
+def star():
+    """Return a body with spikes and pits: every vertex and edge is convex, concave or a saddle."""
+    mesh = trimesh.creation.icosphere(subdivisions=1, radius=20.0)
+    mesh.vertices = mesh.vertices * (1 + 0.8 * np.sin(7 * mesh.vertices[:, [0]]) * np.cos(5 * mesh.vertices[:, [1]]))
+    return mesh
+
+
+def tube():
+    """Return a thin pipe of needles: walls of 0.05 mm, triangles 100 mm long and 0.8 mm wide."""
+    return trimesh.creation.annulus(r_min=3.0, r_max=3.05, height=100.0, sections=24)
+
+
+CLOSED = {
+    "box": lambda: trimesh.creation.box((10.0, 20.0, 30.0)),
+    "star": star,
+    "torus": lambda: trimesh.creation.torus(30.0, 4.0, major_sections=10, minor_sections=8),
+    "foil of 1 um": lambda: trimesh.creation.box((100.0, 60.0, 1e-3)),
+    "foil of 1 nm": lambda: trimesh.creation.box((100.0, 60.0, 1e-6)),
+    "knife of 10 degrees": lambda: wedge(10.0),
+    "knife of 0.1 degrees": lambda: wedge(0.1),
+    "tube": tube,
+}
+
+
+def scattered(vertices, triangles, count, seed):
+    """Return points at distances of 1 pm to 0.1 m around faces, edges and vertices alike."""
+    rng = np.random.default_rng(seed)
+    weights = rng.dirichlet((1, 1, 1), count)
+    weights[count // 3 :, 0] = 0
+    weights[2 * count // 3 :, 1] = 0
+    weights /= weights.sum(axis=1, keepdims=True)
+    on = np.einsum("nk,nkj->nj", weights, vertices[triangles[rng.integers(len(triangles), size=count)]])
+    directions = rng.normal(size=(count, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    return on + directions * 10 ** rng.uniform(-9, 2, (count, 1))
+
+
+def dots(u, v):
+    return np.einsum("...i,...i->...", u, v)
+
+
+def to_segments(points, starts, ends):
+    """Return the distances (n, m) from points to segments."""
+    edges, arms = ends - starts, points[:, None] - starts
+    along = np.clip(dots(arms, edges) / np.maximum(dots(edges, edges), 1e-300), 0, 1)
+    return np.sqrt(((arms - along[..., None] * edges) ** 2).sum(axis=2))
+
+
+def brute_distances(points, vertices, triangles):
+    """Return the unsigned distances (n,) from points to triangles, each tried, in extended precision."""
+    a, b, c = (vertices[triangles[:, k]].astype(np.longdouble) for k in range(3))
+    normals = np.cross(b - a, c - a)
+    normals -= dots(normals, b - a)[:, None] * (b - a) / np.maximum(dots(b - a, b - a), 1e-300)[:, None]
+    normals /= np.maximum(np.sqrt(dots(normals, normals)), 1e-300)[:, None]
+    least = np.empty(len(points))
+    for start in range(0, len(points), 1000):
+        part = points[start : start + 1000].astype(np.longdouble)
+        distances = np.abs(dots(part[:, None] - a, normals))
+        for p, q in ((a, b), (b, c), (c, a)):
+            distances[dots(np.cross(q - p, part[:, None] - p), normals) <= 0] = np.inf
+        for p, q in ((a, b), (b, c), (c, a)):
+            distances = np.minimum(distances, to_segments(part, p, q))
+        least[start : start + 1000] = distances.min(axis=1)
+    return least
+
+
+def brute_inside(points, vertices, triangles):
+    """Tell which points lie inside a closed surface, by its solid angle (Van Oosterom, Strackee 1983).
+
+    A foil of 1 nm is told apart in extended precision only.
+    """
+    vertices = vertices.astype(np.longdouble)
+    inside = np.empty(len(points), dtype=bool)
+    for start in range(0, len(points), 1000):
+        a, b, c = (vertices[triangles[:, k]] - points[start : start + 1000, None] for k in range(3))
+        u, v, w = (np.sqrt(dots(x, x)) for x in (a, b, c))
+        volume = dots(a, np.cross(b, c))
+        angles = 2 * np.arctan2(volume, u * v * w + dots(a, b) * w + dots(b, c) * u + dots(c, a) * v)
+        inside[start : start + 1000] = angles.sum(axis=1) > 2 * np.pi
+    return inside
+
+
+def check_closed(name, count, seed):
+    vertices, triangles = turned(CLOSED[name](), seed)
+    points = scattered(vertices, triangles, count, seed)
+    surface = Surface(vertices, triangles)
+    feet = surface.closest(points)
+    true = brute_distances(points, vertices, triangles)
+    assert surface.closed
+    assert not feet.on_rim.any()
+    np.testing.assert_allclose(np.abs(feet.distance), true, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(points - feet.points, axis=1), true, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(feet.normals, axis=1), 1, rtol=0, atol=1e-12)
+    judged = true > 1e-9
+    wrong = (feet.distance < 0) != brute_inside(points, vertices, triangles)
+    assert np.count_nonzero(wrong & judged) == 0
+
+
+def check_open(name, count, seed):
+    """Cut a third of the triangles out of a closed body.
+
+    Whatever the distance, a point has the side of one next to its foot, and next to it the closed body knows the side.
+    """
+    vertices, triangles = turned(CLOSED[name](), seed)
+    kept = triangles[np.random.default_rng(seed).permutation(len(triangles))[len(triangles) // 3 :]]
+    points = scattered(vertices, triangles, count, seed + 1)
+    surface = Surface(vertices, kept)
+    feet = surface.closest(points)
+    true = brute_distances(points, vertices, kept)
+    np.testing.assert_allclose(np.abs(feet.distance), true, rtol=0, atol=1e-9)
+
+    ends = vertices[surface.rim_edges]
+    batches = np.array_split(feet.points, 50)
+    to_rim = np.concatenate([to_segments(batch, ends[:, 0], ends[:, 1]).min(axis=1) for batch in batches])
+    assert (to_rim[feet.on_rim] < 1e-9).all()
+
+    judged = (true > 1e-9) & (to_rim > 1e-7)
+    step = np.minimum(1.0, 1e-8 / np.maximum(true, 1e-12))[:, None]
+    beside = feet.points + step * (points - feet.points)
+    wrong = (feet.distance < 0) != brute_inside(beside, vertices, triangles)
+    assert np.count_nonzero(judged) > count / 10
+    assert np.count_nonzero(wrong & judged) == 0
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_distances_and_sides_of_a_closed_surface_agree_with_brute_force(name):
+    check_closed(name, 2000, seed=1)
+
+
+@pytest.mark.parametrize("name", ["box", "star", "torus", "knife of 10 degrees", "tube"])
+def test_an_open_surface_takes_the_sides_of_the_body_it_was_cut_from(name):
+    check_open(name, 2000, seed=2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10, 15))
+@pytest.mark.parametrize("name", CLOSED)
+def test_none_of_200000_points_is_on_the_wrong_side(name, seed):
+    check_closed(name, 3000, seed)
+    check_open(name, 2000, seed)
+
+
+def grid_box():
+    """Return a box of 4 x 4 x 4 mm with corners at whole numbers, two triangles to a side."""
+    return trimesh.creation.box((4.0, 4.0, 4.0))
+
+
+def square(turn=((1, 0, 0), (0, 1, 0), (0, 0, 1))):
+    """Return a square of 10 x 10 mm of 50 triangles, facing up before it is turned."""
+    x, y = np.meshgrid(np.arange(6) * 2.0, np.arange(6) * 2.0, indexing="ij")
+    vertices = np.column_stack([x.ravel(), y.ravel(), np.zeros(36)])
+    a = (np.arange(5)[:, None] * 6 + np.arange(5)).ravel()
+    triangles = np.concatenate([np.column_stack([a, a + 6, a + 7]), np.column_stack([a, a + 7, a + 1])])
+    return Surface(vertices @ np.transpose(turn), triangles)
+
+
+def test_where_edges_and_vertices_tie_exactly_the_side_is_right():
+    mesh = grid_box()
+    axis = np.arange(-4, 4.25, 0.25)
+    points = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
+    outside = np.abs(points) - 2
+    true = np.linalg.norm(np.maximum(outside, 0), axis=1) + np.minimum(outside.max(axis=1), 0)
+    np.testing.assert_array_equal(Surface(mesh.vertices, mesh.faces).closest(points).distance, true)
+
+
+@given(turn=st.integers(0, 1000), p=st.tuples(*[st.floats(-20, 30)] * 3))
+@settings(max_examples=50, deadline=None)
+def test_beyond_a_rim_the_foot_is_on_it_and_above_the_face_it_is_not(turn, p):
+    rotation = Rotation.random(rng=turn).as_matrix()
+    feet = square(rotation).closest(np.array([p]) @ rotation.T)
+    margin = min(p[0], p[1], 10 - p[0], 10 - p[1])
+    assert feet.on_rim[0] == (margin < 0) or abs(margin) < 1e-9
+    assert np.sign(feet.distance[0]) == np.sign(p[2]) or abs(p[2]) < 1e-9
+
+
+@given(p=st.tuples(*[st.floats(-50, 50)] * 3), q=st.tuples(*[st.floats(-50, 50)] * 3))
+@settings(max_examples=50, deadline=None)
+def test_a_signed_distance_changes_no_faster_than_the_point_moves(p, q):
+    mesh = star()
+    a, b = Surface(mesh.vertices, mesh.faces).closest([p, q]).distance
+    assert abs(a - b) <= np.linalg.norm(np.subtract(p, q)) + 1e-9
+
+
+def test_distances_move_with_the_part_and_change_sign_when_it_is_turned_inside_out():
+    mesh = star()
+    points = np.random.default_rng(3).uniform(-40, 40, (2000, 3))
+    here = Surface(mesh.vertices, mesh.faces).closest(points)
+    rotation = Rotation.random(rng=4).as_matrix()
+    moved = Surface(mesh.vertices @ rotation.T + 7.0, mesh.faces).closest(points @ rotation.T + 7.0)
+    inside_out = Surface(mesh.vertices, mesh.faces[:, ::-1]).closest(points)
+    np.testing.assert_allclose(moved.distance, here.distance, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(inside_out.distance, -here.distance, rtol=0, atol=1e-12)
+
+
+def test_far_from_the_origin_the_distances_keep_their_digits():
+    mesh = star()
+    shift = np.array([3e6, -5e6, 4e6])
+    vertices = mesh.vertices + shift
+    points = np.random.default_rng(5).uniform(-40, 40, (2000, 3)) + shift
+    near = Surface(vertices - shift, mesh.faces).closest(points - shift)
+    np.testing.assert_allclose(Surface(vertices, mesh.faces).closest(points).distance, near.distance, rtol=0, atol=1e-9)
+
+
+def test_each_answer_is_the_same_in_any_company_and_any_order():
+    mesh = star()
+    surface = Surface(mesh.vertices, mesh.faces)
+    points = np.random.default_rng(6).uniform(-40, 40, (3000, 3))
+    together = surface.closest(points)
+    order = np.random.default_rng(7).permutation(3000)[:1700]
+    apart = surface.closest(points[order])
+    for name in ("points", "distance", "normals", "triangle", "on_rim"):
+        np.testing.assert_array_equal(getattr(apart, name), getattr(together, name)[order])
+
+
+def test_points_on_the_surface_are_their_own_feet():
+    mesh = star()
+    corners = mesh.triangles
+    points = np.concatenate([mesh.vertices, corners.mean(axis=1), corners[:, :2].mean(axis=1)])
+    feet = Surface(mesh.vertices, mesh.faces).closest(points)
+    np.testing.assert_allclose(feet.distance, 0, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(feet.points, points, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(np.linalg.norm(feet.normals, axis=1), 1, rtol=0, atol=1e-12)
+
+
+def test_loose_triangles_behave_like_the_mesh_they_make_up():
+    mesh = star()
+    points = scattered(mesh.vertices, mesh.faces, 3000, seed=8)
+    loose = Surface(mesh.triangles.reshape(-1, 3), np.arange(3 * len(mesh.faces)).reshape(-1, 3))
+    feet, true = loose.closest(points), Surface(mesh.vertices, mesh.faces).closest(points)
+    assert loose.closed
+    np.testing.assert_array_equal(feet.distance, true.distance)
+    np.testing.assert_allclose(feet.normals, true.normals, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("turn", [None, 1, 2])
+def test_triangles_without_area_change_no_distance_and_no_side(turn):
+    """Split each edge of a knife and a box on one side only, and close the gap with a triangle without area."""
+    for mesh in (wedge(10.0), grid_box()):
+        rotation = np.eye(3) if turn is None else Rotation.random(rng=turn).as_matrix()
+        vertices, triangles = mesh.vertices @ rotation.T, mesh.faces
+        middle = len(vertices)
+        a, b, c = triangles[0]
+        split = np.concatenate([triangles[1:], [[a, middle, c], [middle, b, c], [a, b, middle], [a, a, b], [c, c, c]]])
+        broken = Surface(np.concatenate([vertices, vertices[[[a, b]]].mean(axis=1)]), split)
+        points = scattered(vertices, triangles, 3000, seed=9)
+        feet, true = broken.closest(points), Surface(vertices, triangles).closest(points)
+        np.testing.assert_allclose(np.abs(feet.distance), np.abs(true.distance), rtol=0, atol=1e-9)
+        judged = np.abs(true.distance) > 1e-9
+        np.testing.assert_array_equal(np.sign(feet.distance[judged]), np.sign(true.distance[judged]))
+        assert not feet.on_rim.any()
+        assert all(np.isfinite(array).all() for array in (feet.points, feet.distance, feet.normals))
+        np.testing.assert_allclose(np.linalg.norm(feet.normals, axis=1), 1, rtol=0, atol=1e-12)
+
+
+def test_a_hair_without_area_is_near_and_has_no_inside():
+    vertices = [[0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 50], [0, 0, 60], [0, 0, 55]]
+    feet = Surface(vertices, [[0, 1, 2], [3, 4, 5]]).closest([[3, 4, 55], [0, 0, 57], [0, 0, 61]])
+    np.testing.assert_allclose(feet.distance, [5, 0, 1], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(feet.normals[0], [0.6, 0.8, 0], rtol=0, atol=1e-12)
+
+
+def test_an_edge_of_three_triangles_has_the_sum_of_their_normals():
+    vertices = [[0, 0, 0], [10, 0, 0], [5, 10, 0], [5, -10, 0], [5, 0, 10]]
+    surface = Surface(vertices, [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
+    feet = surface.closest([[5, 0, 0]])
+    np.testing.assert_allclose(feet.normals[0], np.array([0, -1, 2]) / np.sqrt(5), rtol=0, atol=1e-12)
+    assert not surface.closed
+
+
+def test_one_triangle_is_a_surface():
+    surface = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    feet = surface.closest([[0.2, 0.2, 3.0], [0.2, 0.2, -3.0], [3.0, 0, 4.0], [-3.0, -4.0, 1e-3]])
+    np.testing.assert_allclose(feet.distance, [3, -3, np.hypot(2, 4), np.hypot(5, 1e-3)], rtol=1e-12)
+    np.testing.assert_array_equal(feet.on_rim, [False, False, True, True])
+
+
+def test_no_points_have_no_feet():
+    feet = square().closest(np.empty((0, 3)))
+    assert feet.points.shape == (0, 3)
+    assert feet.distance.shape == (0,)
+
+
+def test_areas_add_up_to_the_body_and_a_closed_one_faces_nowhere():
+    mesh = trimesh.creation.box((10.0, 20.0, 30.0))
+    surface = Surface(mesh.vertices, mesh.faces)
+    assert surface.areas.sum() == pytest.approx(2200.0)
+    np.testing.assert_allclose(surface.areas @ surface.face_normals, 0, atol=1e-9)
+    np.testing.assert_allclose(surface.bounds, [[-5, -10, -15], [5, 10, 15]])
+    assert surface.diagonal == pytest.approx(np.sqrt(1400.0))
+    np.testing.assert_allclose(surface.vertex_normals, np.sign(mesh.vertices) / np.sqrt(3), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("vertices", "triangles", "words"),
+    [
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.empty((0, 3), int), "at least one triangle"),
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 3]], "does not exist"),
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, -1]], "does not exist"),
+        ([[0, 0, 0], [1, 0, 0], [0, np.nan, 0]], [[0, 1, 2]], "not finite"),
+        ([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], "area"),
+        ([[0, 0, 0], [1e200, 0, 0], [0, 1e200, 0]], [[0, 1, 2]], "digits"),
+        ([[0, 0], [1, 0], [2, 0]], [[0, 1, 2]], "shape"),
+    ],
+)
+def test_what_is_no_surface_is_refused(vertices, triangles, words):
+    with pytest.raises(ValueError, match=words):
+        Surface(vertices, triangles)
+
+
+def test_points_that_are_no_points_are_refused():
+    with pytest.raises(ValueError, match="not finite"):
+        square().closest([[0, 0, np.inf]])
+    with pytest.raises(ValueError, match="shape"):
+        square().closest([[0, 0]])
+
+
+def brute_hits(origins, directions, vertices, triangles):
+    """Return how far rays go, each triangle tried (Moeller, Trumbore 1997), with a hair's breadth of tolerance."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    p = np.cross(directions[:, None], c - a)
+    scale = 1 / dots(p, b - a)
+    arms = origins[:, None] - a
+    q = np.cross(arms, b - a)
+    u, v, t = dots(arms, p) * scale, dots(directions[:, None], q) * scale, dots(c - a, q) * scale
+    return np.where((u >= -1e-12) & (v >= -1e-12) & (u + v <= 1 + 1e-12) & (t > 0), t, np.inf).min(axis=1)
+
+
+@pytest.mark.parametrize("name", ["box", "star", "torus", "knife of 10 degrees"])
+def test_rays_end_where_brute_force_ends_them(name):
+    vertices, triangles = turned(CLOSED[name](), 11)
+    rng = np.random.default_rng(12)
+    origins = vertices.mean(axis=0) + rng.uniform(-60, 60, (2000, 3))
+    targets = scattered(vertices, triangles, 2000, seed=13)
+    directions = (targets - origins) / np.linalg.norm(targets - origins, axis=1, keepdims=True)
+    hits = Surface(vertices, triangles).first_hit(origins, 5.0 * directions)
+    true = brute_hits(origins, directions, vertices, triangles)
+    grazing = np.isinf(hits.distance) != np.isinf(true)
+    assert np.count_nonzero(grazing) <= 2
+    np.testing.assert_allclose(hits.distance[~grazing], true[~grazing], rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(hits.triangle == -1, np.isinf(hits.distance))
+
+
+def test_no_ray_leaves_a_closed_body_through_an_edge_or_a_vertex():
+    vertices, triangles = turned(trimesh.creation.icosphere(subdivisions=2, radius=20.0), 14)
+    surface = Surface(vertices, triangles)
+    corners = vertices[triangles]
+    share = np.linspace(0, 1, 21)[:, None, None]
+    on_edges = (share * corners[:, 0] + (1 - share) * corners[:, 1]).reshape(-1, 3)
+    inside = vertices.mean(axis=0) + np.array([1.0, 2.0, 3.0])
+    hits = surface.first_hit(inside, on_edges - inside)
+    np.testing.assert_allclose(hits.distance, np.linalg.norm(on_edges - inside, axis=1), rtol=0, atol=1e-9)
+
+
+def test_rays_along_the_axes_meet_a_box_where_they_should():
+    surface = Surface(grid_box().vertices, grid_box().faces)
+    directions = np.concatenate([np.eye(3), -np.eye(3)])
+    np.testing.assert_array_equal(surface.first_hit([0, 0, 0], directions).distance, 2.0)
+    np.testing.assert_array_equal(surface.first_hit(-6 * directions, directions).distance, 4.0)
+    np.testing.assert_array_equal(surface.first_hit(6 * directions, directions).distance, np.inf)
+    np.testing.assert_array_equal(surface.first_hit(-6 * directions, directions, reach=3.9).triangle, -1)
+    assert (surface.first_hit(-6 * directions, directions, reach=4.0).triangle >= 0).all()
+
+
+def test_a_ray_needs_a_direction():
+    with pytest.raises(ValueError, match="direction zero"):
+        square().first_hit([0, 0, 1], [0, 0, 0])
+    with pytest.raises(ValueError, match="shape"):
+        square().first_hit(np.zeros((2, 3)), np.zeros((2, 2, 3)))
+
+
+def test_the_kernels_say_the_same_without_the_compiler(tmp_path):
+    """Run in a process of its own, where numba is off from the start."""
+    script = """
+import sys
+import numpy as np
+from inspect3d.nominal.surface import Surface
+given = np.load(sys.argv[1])
+surface = Surface(given["vertices"], given["triangles"])
+feet, hits = surface.closest(given["points"]), surface.first_hit(given["points"], -given["points"])
+np.savez(sys.argv[2], distance=feet.distance, normals=feet.normals, triangle=feet.triangle, hit=hits.distance)
+"""
+    mesh = wedge(10.0)
+    vertices = np.concatenate([mesh.vertices, mesh.vertices[mesh.faces[0, :2]].mean(axis=0, keepdims=True)])
+    triangles = np.concatenate([mesh.faces, [[mesh.faces[0, 0], mesh.faces[0, 1], len(vertices) - 1]]])
+    points = scattered(mesh.vertices, mesh.faces, 200, seed=15)
+    np.savez(tmp_path / "given.npz", vertices=vertices, triangles=triangles, points=points)
+    for switch in ("0", "1"):
+        subprocess.run(
+            [sys.executable, "-c", script, tmp_path / "given.npz", tmp_path / f"{switch}.npz"],
+            env={**os.environ, "NUMBA_DISABLE_JIT": switch},
+            check=True,
+        )
+    compiled, interpreted = np.load(tmp_path / "0.npz"), np.load(tmp_path / "1.npz")
+    for name in compiled.files:
+        np.testing.assert_allclose(interpreted[name], compiled[name], rtol=1e-12, atol=1e-12)
+
+
+def test_a_surface_alone_does_not_load_the_compiler():
+    script = "import sys; import inspect3d.nominal.surface; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
