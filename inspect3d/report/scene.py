@@ -61,7 +61,6 @@ class Scene:
         camera.up = tuple(axes[1])
         camera.parallel_scale = pixel * height / 2
         self.plotter.renderer.ResetCameraClippingRange()
-        self.plotter.render()
         depth = self.plotter.get_image_depth(fill_value=np.nan, reset_camera_clipping_range=False)
         return Sight(far + np.asarray(depth, dtype=np.float64), axes, centre, pixel)
 

@@ -64,7 +64,7 @@
       if (line) { colour = vec4(0.23, 0.25, 0.28, 1.0); return; }
       vec3 facet = normalize(cross(dFdx(eye), dFdy(eye)));
       vec3 n = normalize(mix(normalize(direction + 1e-6), gl_FrontFacing ? facet : -facet, clamp(sharp, 0.0, 1.0)));
-      float light = 0.72 + 0.2 * max(n.z, 0.0) + 0.12 * max(dot(n, normalize(vec3(-0.4, 0.8, 0.9))), 0.0);
+      float light = 0.76 + 0.18 * max(n.z, 0.0) + 0.12 * max(dot(n, normalize(vec3(-0.4, 0.8, 0.9))), 0.0);
       colour = vec4((gl_FrontFacing ? field() : back) * min(light, 1.04), 1.0);
     }`;
   function compiled(kind, code) {
