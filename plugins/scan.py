@@ -53,7 +53,7 @@ class Scan:
             raise ValueError(f"units = {self.units!r} is not known: choose one of {', '.join(get_args(Unit))}")
         if self.frames not in get_args(Frames):
             raise ValueError(f"frames = {self.frames!r} is not known: choose one of {', '.join(get_args(Frames))}")
-        if self.noise is not None and not self._is_noise(self.noise):
+        if self.noise is not None and not _is_noise(self.noise):
             raise ValueError(f"noise = {self.noise!r} is not a standard noise: give a positive number in mm, or none")
 
     def open(self, files: Files) -> ScanSource:
@@ -64,7 +64,8 @@ class Scan:
         InputError
             A file is missing, broken or no point cloud.
         """
-        clouds, remarks = [], []
+        clouds: list[Cloud] = []
+        remarks: list[str] = []
         for path in files["files"]:
             file = read_cloud(path)
             remarks += file.remarks
@@ -95,7 +96,6 @@ class Scan:
         points = np.concatenate([cloud.points for cloud in clouds])
         return Cloud(", ".join(cloud.name for cloud in clouds), points, normals, self.noise)
 
-    @staticmethod
-    def _is_noise(noise: object) -> bool:
-        number = isinstance(noise, int | float) and not isinstance(noise, bool)
-        return number and math.isfinite(noise) and noise > 0
+
+def _is_noise(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < math.inf

@@ -121,7 +121,11 @@ ITEM = '<item objectid="1"/>'
             "vertex 3",
         ),
         ("a.ply", PLY.format(3).replace("end_header\n", FACES.format(9)) + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "9 rows"),
-        ("a.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n", "begins 1 facets, ends 0"),
+        (
+            "a.stl",
+            "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n",
+            "begins 1 facets and ends 0",
+        ),
         ("a.stl", bytes(80) + struct.pack("<I", 2**31) + bytes(100), "declares 2147483648 triangles and holds 2"),
         ("a.stl", b"no STL", "fewer than the header"),
     ],

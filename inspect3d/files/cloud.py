@@ -75,7 +75,8 @@ def read_cloud(path: Path) -> CloudFile:
         do.
     """
     content = opened(path)
-    found = _READERS[content.format](content)
+    with np.errstate(all="ignore"):  # what is not finite is counted below
+        found = _READERS[content.format](content)
     if content.format == "STL":
         found = replace(found, points=_distinct(found.points))
     return _cleaned(content, found)

@@ -11,6 +11,7 @@ import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path, PurePath
+from typing import IO
 
 from inspect3d.outcome import InputError
 
@@ -144,7 +145,7 @@ def _unpacked(path: Path, data: bytes) -> tuple[str, bytes]:
             return _stem(path, ".bz2"), _limited(path, bz2.BZ2File(io.BytesIO(data)))
         if data.startswith(b"PK\x03\x04"):
             return _only_member(path, data)
-    except (OSError, EOFError, zlib.error, zipfile.BadZipFile, NotImplementedError, RuntimeError) as error:
+    except (OSError, EOFError, ValueError, zlib.error, zipfile.BadZipFile, NotImplementedError, RuntimeError) as error:
         raise InputError(f"{path} cannot be unpacked: {error}. Copy or pack it again.") from error
     return path.name, data
 
@@ -161,7 +162,7 @@ def _only_member(path: Path, data: bytes) -> tuple[str, bytes]:
             return known[0], _limited(path, member)
 
 
-def _limited(path: Path, stream: io.BufferedIOBase | gzip.GzipFile | bz2.BZ2File | zipfile.ZipExtFile) -> bytes:
+def _limited(path: Path, stream: io.BufferedIOBase | IO[bytes]) -> bytes:
     data = stream.read(_LARGEST_UNPACKED + 1)
     if len(data) > _LARGEST_UNPACKED:
         raise InputError(f"{path} is larger than 1 GiB when unpacked. Unpack it and name the file.")

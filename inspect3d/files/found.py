@@ -41,4 +41,4 @@ class Found:
     @property
     def finite(self) -> Booleans:
         """Tell which points have coordinates (n,); some programs write the largest number they have for none."""
-        return (np.abs(self.points) < _FARTHEST).all(axis=1)
+        return np.asarray((np.abs(self.points) < _FARTHEST).all(axis=1))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import struct
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from inspect3d.files.content import Content
 from inspect3d.files.found import Found
 
 _CHUNK = 1_000_000
+_RECORD, _EXTENDED_RECORD = 54, 60
 _GEO_KEYS, _WKT = 34735, 2112
 _MODEL, _GEOGRAPHIC, _LINEAR_UNIT = 1024, 2, 3076
 _UNITS = {9001: "m", 9002: "ft", 9003: "US survey ft"}
@@ -27,6 +29,8 @@ def read_las(content: Content) -> Found:
     """
     import laspy
 
+    if not _is_whole(content.data):
+        raise content.refused("has no LAS header that fits its size", "Export or copy it again.")
     try:
         # laspy and its decompressor report a damaged file through many types of exception, so all are taken for one
         with laspy.open(io.BytesIO(content.data)) as file:
@@ -48,6 +52,19 @@ def read_las(content: Content) -> Found:
     return Found(points, units=units)
 
 
+def _is_whole(data: bytes) -> bool:
+    """Tell whether the records that the header announces fit into the file; laspy would look for them one by one."""
+    if len(data) < 227:
+        return False
+    minor, size, points_at, records = data[25], *struct.unpack_from("<HII", data, 94)
+    if not size + _RECORD * records <= points_at <= len(data):
+        return False
+    if minor < 4 or size < 375:
+        return minor < 4
+    start, extended = struct.unpack_from("<QI", data, 235)
+    return not extended or points_at <= start <= len(data) - _EXTENDED_RECORD * extended
+
+
 def _coordinates(chunk: Any) -> np.ndarray:
     return np.column_stack([np.asarray(axis, dtype=np.float64) for axis in (chunk.x, chunk.y, chunk.z)])
 
@@ -63,7 +80,7 @@ def _reference(header: Any) -> tuple[str | None, bool]:
             return (_named(units[0]) if units else None), "GEOG" in text and not projected
         if record.record_id == _GEO_KEYS:
             keys = {key.id: key.value_offset for key in record.geo_keys}
-            return _UNITS.get(keys.get(_LINEAR_UNIT)), keys.get(_MODEL) == _GEOGRAPHIC
+            return _UNITS.get(keys.get(_LINEAR_UNIT, 0)), keys.get(_MODEL) == _GEOGRAPHIC
     return None, False
 
 

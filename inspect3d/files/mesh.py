@@ -56,7 +56,8 @@ def read_mesh(path: Path) -> MeshFile:
     if reader is None:
         known = ", ".join(_READERS)
         raise content.refused(f"is a point cloud ({content.format}), not a mesh", f"Give a mesh: {known}.")
-    found = reader(content)
+    with np.errstate(all="ignore"):  # what is not finite is counted below
+        found = reader(content)
     if not len(found.sizes):
         what = f"holds {len(found.points)} points but no triangles" if len(found.points) else "holds no triangles"
         raise content.refused(what, "Export it as a mesh.")

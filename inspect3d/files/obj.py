@@ -21,9 +21,9 @@ def read_obj(content: Content) -> Found:
     """
     text = content.text().replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
     lines = [line.strip() for line in text.split(b"\n")]
-    kinds = [line.split(None, 1)[0] if line else b"" for line in lines]
-    wanted = {kind: [i for i, known in enumerate(kinds) if known == kind] for kind in (b"v", b"vn", b"f", b"surf")}
-    if wanted[b"surf"]:
+    kinds = np.array([line[:2].rstrip() for line in lines], dtype="S2")
+    wanted = {kind: np.flatnonzero(kinds == kind) for kind in (b"v", b"vn", b"f", b"su")}
+    if len(wanted[b"su"]):
         raise content.refused("holds free-form surfaces", "Export it as a mesh, or the CAD model as STEP.")
     points = _rows(content, lines, wanted[b"v"], (3, 4, 6, 7))
     corners, sizes = _faces(content, lines, wanted[b"f"], wanted[b"v"])
@@ -32,25 +32,25 @@ def read_obj(content: Content) -> Found:
     return Found(points, normals, corners, sizes)
 
 
-def _rows(content: Content, lines: list[bytes], at: list[int], widths: tuple[int, ...]) -> Floats:
+def _rows(content: Content, lines: list[bytes], at: Integers, widths: tuple[int, ...]) -> Floats:
     """Return x, y, z of the lines; behind them may follow a weight or a colour."""
-    if not at:
+    if not len(at):
         return np.zeros((0, 3))
     words = np.array([len(lines[i].split()) - 1 for i in at])
     wrong = np.flatnonzero((words != words[0]) | ~np.isin(words, widths))
     if len(wrong):
         line = at[wrong[0]]
         raise content.refused(f"has {words[wrong[0]]} numbers in line {line + 1}, {_shown(lines[line])}")
-    rows = numbers(content, b"\n".join(lines[i].split(None, 1)[1] for i in at)).reshape(len(at), words[0])
+    rows = numbers(content, b"\n".join(lines[i][2:] for i in at)).reshape(len(at), words[0])
     return rows[:, :3].copy()
 
 
-def _faces(content: Content, lines: list[bytes], at: list[int], vertices_at: list[int]) -> tuple[Integers, Integers]:
+def _faces(content: Content, lines: list[bytes], at: Integers, vertices_at: Integers) -> tuple[Integers, Integers]:
     sizes = np.array([len(lines[i].split()) - 1 for i in at], dtype=np.int64)
     few = np.flatnonzero(sizes < 3)
     if len(few):
         raise content.refused(f"has a face of {sizes[few[0]]} corners in line {at[few[0]] + 1}")
-    joined = b"\n".join(lines[i].split(None, 1)[1] for i in at)
+    joined = b"\n".join(lines[i][2:] for i in at)
     given = numbers(content, _MORE_THAN_INDEX.sub(b"", joined))
     if len(given) != sizes.sum():
         raise content.refused("has a face with a corner that has no vertex")

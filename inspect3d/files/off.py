@@ -6,11 +6,13 @@ import re
 
 import numpy as np
 
+from inspect3d.arrays import Floats, Integers
 from inspect3d.files.content import Content
 from inspect3d.files.found import Found
 from inspect3d.files.numbers import numbers
 
 _KEYWORD = re.compile(rb"(?:ST|C|N)*OFF\b", re.IGNORECASE)
+_DIGITS = 18
 _CUT = "It was cut short, or its counts are wrong: export or copy it again."
 
 
@@ -27,7 +29,7 @@ def read_off(content: Content) -> Found:
     body = 1
     if not counts and len(lines) > 1:
         counts, body = lines[1].split(), 2
-    if len(counts) not in (2, 3) or not all(count.isdigit() for count in counts):
+    if len(counts) not in (2, 3) or not all(count.isdigit() and len(count) < _DIGITS for count in counts):
         raise content.refused("does not start with the counts of vertices, faces and edges (binary OFF is not read)")
     vertices, faces = int(counts[0]), int(counts[1])
     if vertices + faces > len(lines) - body:
@@ -37,26 +39,38 @@ def read_off(content: Content) -> Found:
         raise content.refused(f"has more lines than the {vertices} vertices and {faces} faces it declares", _CUT)
     points = _rows(content, lines[body : body + vertices])
     has_normals = b"N" in keyword[0].upper() and points.shape[1] >= 6
-    rows = [line.split() for line in lines[body + vertices :]]
-    sizes = numbers(content, b" ".join(row[0] for row in rows)).astype(np.int64)
-    wrong = [i for i, row in enumerate(rows) if sizes[i] < 1 or len(row) <= sizes[i]]
-    if wrong:
-        raise content.refused(
-            f"has a face whose corners are not as many as it says: {b' '.join(rows[wrong[0]])[:60]!r}"
-        )
-    corners = numbers(
-        content, b" ".join(word for row, size in zip(rows, sizes, strict=True) for word in row[1 : size + 1])
-    )
+    corners, sizes = _faces(content, lines[body + vertices :])
+    return Found(points[:, :3].copy(), points[:, 3:6].copy() if has_normals else None, corners, sizes)
+
+
+def _faces(content: Content, lines: list[bytes]) -> tuple[Integers, Integers]:
+    """Return the corners, flat, and their number for each face; what follows them in a line is a colour."""
+    if not lines:
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    widths = np.array([len(line.split()) for line in lines])
+    values = numbers(content, b" ".join(lines))
+    starts = np.cumsum(widths) - widths
+    sizes = values[starts]
+    wrong = np.flatnonzero((sizes < 1) | (sizes >= widths) | (sizes != np.floor(sizes)))
+    if len(wrong):
+        raise content.refused(f"has a face whose corners are not as many as it says: {_shown(lines[wrong[0]])}")
+    sizes = sizes.astype(np.int64)
+    within = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    corners = values[np.repeat(starts + 1, sizes) + within]
     if not np.array_equal(corners, np.floor(corners)):
         raise content.refused("has a face whose corners are not whole numbers")
-    return Found(points[:, :3].copy(), points[:, 3:6].copy() if has_normals else None, corners.astype(np.int64), sizes)
+    return corners.astype(np.int64), sizes
 
 
-def _rows(content: Content, lines: list[bytes]) -> np.ndarray:
+def _rows(content: Content, lines: list[bytes]) -> Floats:
     if not lines:
         return np.zeros((0, 3))
     width = len(lines[0].split())
     for line in lines:
         if len(line.split()) != width or width < 3:
-            raise content.refused(f"has a vertex that is not like the first or has no x, y, z: {line[:60]!r}")
+            raise content.refused(f"has a vertex unlike the first or without x, y, z: {_shown(line)}")
     return numbers(content, b" ".join(lines)).reshape(len(lines), width)
+
+
+def _shown(line: bytes) -> str:
+    return repr(line[:60].decode("utf-8", "replace"))

@@ -18,6 +18,7 @@ _TYPES = {"F4": "<f4", "F8": "<f8", "I1": "<i1", "I2": "<i2", "I4": "<i4", "I8":
 }
 _NORMALS = (("normal_x", "normal_y", "normal_z"), ("nx", "ny", "nz"))
 _STILL = [0, 0, 0, 1, 0, 0, 0]
+_MOST = 2**24
 _CUT = "It was cut short, or its header is wrong: export or copy it again."
 
 
@@ -69,9 +70,15 @@ def _header(content: Content, text: str) -> _Header:
         viewpoint = [float(word) for word in told.get("VIEWPOINT", [])] or [float(word) for word in _STILL]
     except (KeyError, ValueError, IndexError) as error:
         raise content.refused(f"has a PCD header that lacks something or has a wrong value: {error}") from error
-    if not len(names) == len(types) == len(counts) or points < 0 or min(counts, default=0) < 0:
-        raise content.refused("has a PCD header whose FIELDS, SIZE, TYPE and COUNT are not equally long")
+    if not len(names) == len(types) == len(counts) or points < 0 or not _plausible(counts):
+        raise content.refused(
+            "has a PCD header whose FIELDS, SIZE, TYPE and COUNT are not equally long or out of range"
+        )
     return _Header(names, types, counts, points, viewpoint)
+
+
+def _plausible(counts: tuple[int, ...]) -> bool:
+    return min(counts, default=0) >= 0 and sum(counts) < _MOST
 
 
 def _ascii(content: Content, header: _Header, body: bytes, first_line: int) -> dict[str, np.ndarray]:

@@ -15,6 +15,7 @@ from inspect3d.files.ply_tape import AsciiTape, BinaryTape, Tape
 from inspect3d.outcome import InputError
 
 _CUT = "It was cut short, or its header is wrong: export or copy it again."
+_DIGITS = 18
 _NO_LISTS = (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
 
 
@@ -51,7 +52,7 @@ def _declared(element: Element, words: list[bytes]) -> list[bytes]:
     """Return the words of a row that the header declares."""
     end = 0
     for column in element.properties:
-        counted = column.count and end < len(words) and words[end].isdigit()
+        counted = column.count and end < len(words) and words[end].isdigit() and len(words[end]) < _DIGITS
         end += 1 + int(words[end]) if counted else 1
     return words[:end]
 
@@ -66,11 +67,13 @@ def _from_numbers(content: Content, header: PlyHeader, text: bytes, remarks: tup
 
 def _found(content: Content, tables: dict[str, dict[str, Any]], remarks: tuple[str, ...]) -> Found:
     vertex, face = tables.get("vertex", {}), tables.get("face", {})
-    if not {"x", "y", "z"} <= {name for name, column in vertex.items() if not isinstance(column, tuple)}:
+    single = {name for name, column in vertex.items() if not isinstance(column, tuple)}
+    if not {"x", "y", "z"} <= single:
         raise content.refused("has no element `vertex` with the properties x, y and z")
-    normals = _columns(vertex, "nx", "ny", "nz") if {"nx", "ny", "nz"} <= vertex.keys() else None
-    lists = face.get("vertex_indices", face.get("vertex_index", _NO_LISTS))
-    return Found(_columns(vertex, "x", "y", "z"), normals, *lists, remarks=remarks)
+    normals = _columns(vertex, "nx", "ny", "nz") if {"nx", "ny", "nz"} <= single else None
+    listed = {name: column for name, column in face.items() if isinstance(column, tuple)}
+    corners, sizes = listed.get("vertex_indices", listed.get("vertex_index", _NO_LISTS))
+    return Found(_columns(vertex, "x", "y", "z"), normals, corners, sizes, remarks=remarks)
 
 
 def _columns(table: dict[str, Any], *names: str) -> Floats:
@@ -137,7 +140,7 @@ def _row_by_row(element: Element, tape: Tape) -> dict[str, Any]:
 
 def _length(tape: Tape, kind: str) -> int:
     (length,) = tape.take(kind, 1)
-    if length != int(length) or length < 0:
+    if not float(length).is_integer() or length < 0:
         raise _BadLength(f"{length:g}")
     return int(length)
 

@@ -13,6 +13,7 @@ _TYPES = {
     "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
     "float32": "f4", "float64": "f8", "int64": "i8", "uint64": "u8",
 }  # fmt: skip
+_DIGITS = 18
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _END = re.compile(rb"[\r\n]end_header[ \t]*(\r\n|\n|\r|$)")
 
@@ -73,7 +74,9 @@ def read_ply_header(content: Content) -> PlyHeader:
                 continue
             case ["format", name, "1.0"] if name in _ORDERS and order is None:
                 order = _ORDERS[name]
-            case ["element", name, rows] if rows.isdecimal() and name not in [known.name for known in elements]:
+            case ["element", name, rows] if (
+                rows.isdecimal() and len(rows) < _DIGITS and name not in [known.name for known in elements]
+            ):
                 elements.append(Element(name, int(rows), ()))
             case ["property", "list", count, kind, name] if elements and count in _TYPES and kind in _TYPES:
                 elements[-1] = _widened(elements[-1], Property(name.lower(), _TYPES[kind], _TYPES[count]))

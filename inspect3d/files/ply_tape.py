@@ -90,8 +90,10 @@ class BinaryTape:
         """Return every row of an element at once."""
         fields: list[Any] = []
         for column, n in zip(element.properties, lengths, strict=True):
-            kinds = [(column.count,), (column.type, (n,))] if column.count else [(column.type,)]
-            fields += [(f"f{len(fields) + i}", self.order + kind[0], *kind[1:]) for i, kind in enumerate(kinds)]
+            if column.count:
+                fields.append((f"f{len(fields)}", self.order + column.count))
+            shape = (n,) if column.count else ()
+            fields.append((f"f{len(fields)}", self.order + column.type, shape))
         row = np.dtype(fields)
         if element.rows * row.itemsize > self.left():
             raise EOFError

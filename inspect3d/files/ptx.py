@@ -10,6 +10,7 @@ from inspect3d.files.table import table
 
 _HEADER = 10
 _WIDTHS = (3, 4, 7)
+_DIGITS = 18
 _CUT = "It was cut short: export or copy it again."
 
 
@@ -20,16 +21,15 @@ def read_ptx(content: Content) -> Found:
     that acts on row vectors, (x y z 1) M; then x y z, and perhaps intensity and colour. A row 0 0 0 is a direction
     without a point and is dropped.
     """
-    text = content.text()
-    ends = np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n")) + 1
-    starts = np.concatenate([[0], ends, [len(text)] if not text.endswith(b"\n") else []]).astype(np.int64)
+    text = content.text().rstrip() + b"\n"
+    starts = np.append(0, np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n")) + 1)
     points, dropped, line = [], 0, 0
-    while text[starts[line] :].strip():
+    while line < len(starts) - 1:
         if line + _HEADER >= len(starts):
             raise content.refused(f"ends within the ten lines of a station that starts in line {line + 1}", _CUT)
         lines = [text[starts[i] : starts[i + 1]] for i in range(line, line + _HEADER)]
         grid = [word.strip() for word in lines[:2]]
-        if not all(word.isdigit() for word in grid):
+        if not all(word.isdigit() and len(word) < _DIGITS for word in grid):
             raise content.refused(f"has {grid[0][:40]!r} in line {line + 1} where the size of a station is expected")
         matrix = table(content, b"".join(lines[6:]), line + 7)
         if matrix.shape != (4, 4) or not np.allclose(matrix[:, 3], [0, 0, 0, 1]) or not np.isfinite(matrix).all():
@@ -41,7 +41,7 @@ def read_ptx(content: Content) -> Found:
         if len(rows) != count or (count and rows.shape[1] not in _WIDTHS):
             raise content.refused(f"has rows that are no points x y z between lines {first + 1} and {first + count}")
         hit = rows[:, :3].any(axis=1)
-        dropped += np.count_nonzero(~hit)
+        dropped += int(np.count_nonzero(~hit))
         points.append(rows[hit, :3] @ matrix[:3, :3] + matrix[3, :3])
         line = first + count
     name = content.path.name

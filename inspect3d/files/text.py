@@ -13,7 +13,7 @@ from inspect3d.files.table import table
 from inspect3d.files.text_layout import text_layout
 
 _COMMENTS = re.compile(rb"^[ \t]*(#|//|%|!)[^\n]*$", re.MULTILINE)
-_COUNT = re.compile(rb"\s*(\d+)[ \t]*\r?(\n|$)")
+_COUNT = re.compile(rb"\s*(\d{1,17})[ \t]*\r?(\n|$)")
 _NAMED = ("x", "y", "z", "nx", "ny", "nz")
 _CUT = "It was cut short, or its count is wrong: export or copy it again."
 
