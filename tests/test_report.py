@@ -20,10 +20,11 @@ from inspect3d.nominal.nominal import InspectionMesh, Nominal
 from inspect3d.nominal.surface import Surface
 from inspect3d.outcome import InputError, Status
 from inspect3d.pose import Pose
-from inspect3d.recipe import Recipe
+from inspect3d.recipe import Label, Recipe
 from inspect3d.record import InputFile, MeasuredPart, Record
 from inspect3d.register.alignment import Alignment, Candidate, FreeMotion
 from inspect3d.report.bands import bands
+from inspect3d.report.reading import readings
 from inspect3d.report.results import as_json, results, verdict_shares
 from inspect3d.report.screenshot import screenshot
 from inspect3d.report.verdict_words import verdict_words
@@ -214,6 +215,15 @@ def test_every_picture_shows_the_measured_side(out):
     assert "laser_histogram.png" in names
     html = (out / "report.html").read_text("utf-8")
     assert not re.search(r"Deviation from the CAD model, seen from −z", html)
+
+
+def test_a_named_point_is_not_read_on_the_other_side_of_a_thin_wall(record):
+    mesh, part = record.nominal.mesh, record.parts[0]
+    thin = InspectionMesh(mesh.nodes * [1, 1, 0.1], mesh.triangles, mesh.normals, mesh.crease, mesh.face)
+    labels = (Label(name="top", point=(0, 0, 0.5)), Label(name="below", point=(0, 0, -0.5)))
+    top, below = readings(thin, part, labels)
+    assert (top.value, top.verdict) == (0.05, 1)
+    assert below.node is None
 
 
 def test_a_record_without_any_map_still_makes_a_report(record, tmp_path):

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from inspect3d.outcome import Status
 from inspect3d.record import MeasuredPart, Record
 from inspect3d.report.colours import BAND_COLOURS, UNMEASURED
 from inspect3d.report.digits import COVERAGE, decimals, grouped, measured, number
@@ -50,6 +51,7 @@ class Account:
     name, method, provenance, status, reason, remarks : of the measurement; status in words
     anchor : the place on the page
     failed : there is no map
+    noteworthy : the status belongs into the summary
     badge, badge_kind : the result in a word, and its colour
     advice : what to do about a failure
     verdict : on the tolerance, in a sentence
@@ -67,6 +69,7 @@ class Account:
     remarks: tuple[str, ...]
     anchor: str
     failed: bool
+    noteworthy: bool
     badge: str
     badge_kind: str
     advice: str = ""
@@ -105,6 +108,7 @@ def account(record: Record, part: MeasuredPart, values: Mapping[str, Any], ancho
         "reason": part.reason,
         "remarks": part.remarks + tuple(remark for each in part.alignments for remark in each.remarks),
         "anchor": anchor,
+        "noteworthy": part.status is not Status.OK,
         "poses": poses(part),
         "seconds": [(stage, number(seconds, 2)) for stage, seconds in part.seconds.items()],
         "pictures": pictures,

@@ -19,6 +19,8 @@ FRAMES = ("#5d6570", "#3b7a57", "#b9770e", "#b03a2e")
 def draw_flags(canvas: Canvas, layout: Layout, seen: Sequence[Reading], pixels: Floats) -> None:
     """Draw the flags in two columns beside the part, in the order of their points, so that no leaders cross.
 
+    What does not fit beside the part is left to the table of named points.
+
     Parameters
     ----------
     seen : the readings whose nodes are seen

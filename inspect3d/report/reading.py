@@ -14,6 +14,8 @@ from inspect3d.record import MeasuredPart
 
 NEAR = 2.0
 """Edge lengths of the mesh within which a node speaks for a named point."""
+ALIKE = 0.5
+"""Cosine between normals that belong to the same side of a wall."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,19 +47,24 @@ class Reading:
 
 
 def readings(mesh: InspectionMesh, part: MeasuredPart, labels: Sequence[Label]) -> tuple[Reading, ...]:
-    """Return what the map of a measurement says at each label; nothing where it has no map."""
+    """Return what the map of a measurement says at each label; nothing where it has no map.
+
+    The other side of a thin wall may be nearer than the next observed node, but does not speak for the label: a node
+    that does has a normal within 60 degrees of that of the node nearest to the label, observed or not.
+    """
     if part.deviation is None:
         return ()
-    observed = np.flatnonzero(part.deviation.observed)
     verdict = np.zeros(len(mesh), dtype=np.int64) if part.verdict is None else part.verdict
     found = []
     for label in labels:
         asked = np.array(label.point, dtype=np.float64)
-        distance = np.linalg.norm(mesh.nodes[observed] - asked, axis=1)
-        if not len(observed) or distance.min() > NEAR * mesh.edge_length:
+        distance = np.linalg.norm(mesh.nodes - asked, axis=1)
+        alike = mesh.normals @ mesh.normals[distance.argmin()] > ALIKE
+        distance[~(alike & part.deviation.observed)] = np.inf
+        if distance.min() > NEAR * mesh.edge_length:
             found.append(Reading(label.name, asked, None, asked, np.nan, np.nan, 0))
             continue
-        node = int(observed[distance.argmin()])
+        node = int(distance.argmin())
         value, sigma = float(part.deviation.value[node]), float(part.deviation.sigma[node])
         found.append(Reading(label.name, asked, node, mesh.nodes[node], value, sigma, int(verdict[node])))
     return tuple(found)
