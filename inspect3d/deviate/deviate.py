@@ -129,8 +129,8 @@ class Deviate:
         cosine = np.einsum("ni,ni->n", normals, feet.normals)
         near = np.abs(feet.distance - self.coating) < reach
         told = np.linalg.norm(normals, axis=1) > 0.5
-        trusted = np.count_nonzero(cosine[near & told] > 0) > 0.7 * max(np.count_nonzero(near & told), 1)
-        part = near & (~told | (cosine > 0)) if trusted else near
+        turned_in = np.count_nonzero(cosine[near & told] < 0) > 0.7 * np.count_nonzero(near & told)
+        part = near if turned_in else near & (~told | (cosine > 0))
         fit = self.to_node(nominal.mesh, feet, part, noise)
         observed = fit.observed & counted
         if np.count_nonzero(observed) < LEAST_NODES:

@@ -69,6 +69,7 @@ def _turn(scaled: Floats, origin: Floats, length: float) -> FreeMotion:
     axis = _signed(rotation / speed)
     rotation, translation = axis, translation / speed * np.sign(axis @ rotation)
     foot = origin + np.cross(axis, translation)
+    foot = foot - (foot @ axis) * axis  # the point of the axis nearest to the CAD's origin
     pitch = float(axis @ translation)
     direction = np.concatenate([axis, translation])
     if abs(pitch) < SMALL * length:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -86,6 +86,9 @@ class Register:
         """Return the pose that the cloud chooses among all, or refuse it."""
         few = thinned(cloud, FEW)
         choice = BlindStart()(few, self._smooth, self._field)
+        if few.oriented and self._share(choice.fit, few) < FITS:  # the normals of the file may point inwards
+            few = replace(few, oriented=False)
+            choice = BlindStart()(few, self._smooth, self._field)
         candidates = _candidates(choice, to_centre)
         registers, free = self._registers(choice, few)
         if not registers or free:
