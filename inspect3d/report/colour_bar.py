@@ -21,7 +21,7 @@ def draw_colour_bar(canvas: Canvas, layout: Layout, scale: ColourScale, toleranc
     canvas.text(left - 32 * u, layout.top + 14 * u, heading, 26, weight="bold")
     if scale.classes:
         left = layout.right + 32 * u
-        _draw_classes(canvas, scale, (left, width, top, bottom))
+        _draw_classes(canvas, scale, (left, 34 * u, top, bottom))
     else:
         _draw_values(canvas, scale, (left, width, top, bottom), tolerance)
     _patch(canvas, layout.right + 32 * u, layout.bottom - 22 * u, 34 * u, 26 * u, UNMEASURED)
@@ -80,7 +80,7 @@ def _draw_classes(canvas: Canvas, scale: ColourScale, box: tuple[float, float, f
     for k, (colour, words) in enumerate(zip(scale.colours[::-1], scale.classes[::-1], strict=True)):
         y = top + k * step
         _patch(canvas, left, y, width, 46 * u, colour)
-        canvas.text(left + width + 14 * u, y + 23 * u, words, 24)
+        canvas.text(left + width + 12 * u, y + 23 * u, words, 24)
 
 
 def _patch(canvas: Canvas, left: float, top: float, width: float, height: float, colour: object) -> None:

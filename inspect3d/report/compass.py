@@ -33,8 +33,10 @@ def draw_compass(canvas: Canvas, layout: Layout, axes: Floats, pixel: float, wor
             continue
         arrow = {"arrowstyle": "-|>", "color": COLOURS[k], "lw": 2.2 * u, "mutation_scale": 13 * u}
         canvas.axes.annotate("", (x + arm * right, y - arm * up), (x, y), arrowprops=arrow)
+        nearer = [j for j in range(3) if axes[2, j] > axes[2, k] and np.hypot(*(axes[:2, j] - axes[:2, k])) < 0.4]
+        lower = 26 * u if nearer else 0.0
         beyond = arm + 15 * u / max(length, 0.3)
-        canvas.text(x + beyond * right, y - beyond * up, "xyz"[k], 26, ha="center", color=COLOURS[k])
+        canvas.text(x + beyond * right, y - beyond * up + lower, "xyz"[k], 26, ha="center", color=COLOURS[k])
     left = 220 * u
     length = round_length(pixel * 300 * u)
     right = left + length / pixel

@@ -32,9 +32,10 @@ class Caption:
         """Write the words at the top of a sheet."""
         u = canvas.unit
         width = canvas.width - 60 * u
-        canvas.fitted(30 * u, 40 * u, self.title, 40, width, weight="bold")
+        size = min(40.0, max(26.0, 40.0 * width / max(canvas.measure(self.title, 40, "bold"), 1.0)))
+        canvas.fitted(30 * u, 40 * u, self.title, size, width, weight="bold")
         canvas.fitted(30 * u, 86 * u, self.subtitle, 30, width)
-        canvas.fitted(30 * u, 126 * u, self.figures, 25, width, color=PALE)
+        canvas.fitted(30 * u, 126 * u, self.figures, 24, width, color=PALE)
 
 
 @dataclass(frozen=True, eq=False)

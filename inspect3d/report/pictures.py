@@ -155,5 +155,5 @@ def _figures(record: Record, part: MeasuredPart) -> str:
     return (
         f"mean {number(figures.mean, places, True)} · std {number(figures.std, places)} · "
         f"min {number(figures.min, places, True)} · max {number(figures.max, places, True)} mm · "
-        f"median U (k = 2) {number(expanded, places)} mm · {number(share, 1)} % of the area measured"
+        f"median U (k = 2) {number(expanded, places)} mm · area measured {number(share, 1)} %"
     )

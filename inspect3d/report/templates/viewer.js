@@ -138,7 +138,7 @@
   }
   function pixel() { /* mm per CSS pixel */
     const w = canvas.clientWidth, h = canvas.clientHeight;
-    return Math.max((2.15 * view.fit[0]) / w, (2.15 * view.fit[1]) / h, 1e-9) / view.zoom;
+    return Math.max((2.25 * view.fit[0]) / w, (2.25 * view.fit[1]) / h, 1e-9) / view.zoom;
   }
   function onScreen(k) {
     const p = pixel(), t = view.turn, x = nodes[3 * k], y = nodes[3 * k + 1], z = nodes[3 * k + 2];
@@ -228,12 +228,12 @@
     none.prepend(patch);
     bar.append(none);
   }
-  function words(node) {
+  function words(node, judged) {
     const value = map.fields[0].values[node], sigma = map.fields[1].values[node];
     if (!Number.isFinite(value)) return crease[node] ? "on an edge: no deviation" : "not measured";
     const expanded = 2 * sigma, leading = Math.floor(Math.log10(Number(expanded.toPrecision(2))));
     const places = Math.min(Math.max(1 - leading, 0), 6), text = value.toFixed(places);
-    const verdict = map.fields[2] && map.fields[2].shown[node] ? `, ${map.fields[2].classes[map.fields[2].values[node] - 1]}` : "";
+    const verdict = judged && map.fields[2] && map.fields[2].shown[node] ? `, ${map.fields[2].classes[map.fields[2].values[node] - 1]}` : "";
     return minus(`${Number(text) > 0 ? "+" : ""}${text} \u00b1 ${expanded.toFixed(places)} mm`) + verdict;
   }
   function position(node) {
@@ -265,7 +265,7 @@
     const node = nodeAt(x, y);
     probe.hidden = node < 0;
     if (node < 0) return;
-    probe.replaceChildren(made("strong", "", words(node)), made("span", "", `at ${position(node)} mm`));
+    probe.replaceChildren(made("strong", "", words(node, true)), made("span", "", `at ${position(node)} mm`));
     const left = x + 16 + probe.offsetWidth > canvas.clientWidth ? x - 12 - probe.offsetWidth : x + 16;
     probe.style.transform = `translate(${Math.max(left, 0)}px, ${Math.max(y - 52, 0)}px)`;
   }
@@ -277,18 +277,26 @@
     tag.append(text, close);
     flag.append(tag);
     overlay.append(flag);
-    pins.push({ node, name, flag, text });
+    pins.push({ node, name, flag, tag, text });
     draw();
   }
   function placePins() {
-    const t = view.turn;
+    const t = view.turn, taken = [];
     for (const each of pins) {
       const k = each.node, [x, y] = onScreen(k);
       const facing = t[2][0] * normals[3 * k] + t[2][1] * normals[3 * k + 1] + t[2][2] * normals[3 * k + 2] > 0;
       each.flag.hidden = !facing || x < 0 || y < 0 || x > canvas.clientWidth || y > canvas.clientHeight;
-      each.text.textContent = (each.name ? `${each.name}: ` : "") + words(k);
+      each.text.textContent = (each.name ? `${each.name}: ` : "") + words(k, false);
       each.flag.classList.toggle("flipped", x > 0.7 * canvas.clientWidth);
       each.flag.style.transform = `translate(${x}px, ${y}px)`;
+      if (each.flag.hidden) continue;
+      const width = each.tag.offsetWidth + 6, height = each.tag.offsetHeight + 3;
+      const left = x > 0.7 * canvas.clientWidth ? x - 9 - width : x + 9;
+      let top = y - 28;
+      const meets = (other) => left < other[0] + other[2] && other[0] < left + width && Math.abs(top - other[1]) < height;
+      for (let found = taken.find(meets); found; found = taken.find(meets)) top = found[1] + height;
+      taken.push([left, top, width]);
+      each.tag.style.top = `${top - y}px`;
     }
   }
   function placeCompass(p) {
@@ -301,7 +309,8 @@
       group.querySelector("line").setAttribute("x2", 30 * arm.x);
       group.querySelector("line").setAttribute("y2", 30 * arm.y);
       group.querySelector("text").setAttribute("x", l > 0.05 ? (30 + 10 / Math.max(l, 0.3)) * arm.x : -9);
-      group.querySelector("text").setAttribute("y", l > 0.05 ? (30 + 10 / Math.max(l, 0.3)) * arm.y : 11);
+      const nearer = arms.some((other) => other.z > arm.z && Math.hypot(other.x - arm.x, other.y - arm.y) < 0.4);
+      group.querySelector("text").setAttribute("y", (l > 0.05 ? (30 + 10 / Math.max(l, 0.3)) * arm.y : 11) + (nearer ? 12 : 0));
     }
     const wanted = 150 * p, power = 10 ** Math.floor(Math.log10(wanted));
     const length = power * [5, 2, 1].find((step) => step * power <= wanted * (1 + 1e-9));
