@@ -86,11 +86,14 @@ class Register:
         """Return the pose that the cloud chooses among all, or refuse it."""
         few = thinned(cloud, FEW)
         choice = BlindStart()(few, self._smooth, self._field)
-        if few.oriented and self._share(choice.fit, few) < FITS:  # the normals of the file may point inwards
-            few = replace(few, oriented=False)
-            choice = BlindStart()(few, self._smooth, self._field)
-        candidates = _candidates(choice, to_centre)
         registers, free = self._registers(choice, few)
+        if few.oriented and not registers:  # the normals of the file may point into the material
+            either = replace(few, oriented=False)
+            other = BlindStart()(either, self._smooth, self._field)
+            if self._registers(other, either)[0]:
+                few, choice = either, other
+                registers, free = self._registers(choice, few)
+        candidates = _candidates(choice, to_centre)
         if not registers or free:
             hint = unit_hint(few.points, self.nominal.diagonal, registers, free, lambda factor: self._at(few, factor))
             if hint:
