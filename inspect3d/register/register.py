@@ -26,7 +26,8 @@ from inspect3d.register.units import unit_hint
 LEAST_POINTS = 20
 NEAR = 0.03  # share of the cloud's extent within which a point is an inlier
 REGISTERS = 0.8  # share of inliers above which a cloud registers, if it does so in one pose only
-FITS = 0.6  # share of inliers below which a cloud is refused
+FITS = 0.5  # share of inliers below which a cloud is refused
+ROUGH = 5.0  # noises; a fit rougher than this is refused unless the cloud registers beyond doubt
 FEW, MANY = 1500, 20_000  # points of the search, and of the last refinement
 
 
@@ -135,7 +136,7 @@ class Register:
 
     def _require_fit(self, cloud: Cloud, fit: Fit, few: Thinned, candidates: tuple[Candidate, ...]) -> None:
         share = self._share(fit, few)
-        if share >= FITS:
+        if share >= (FITS if fit.scale < ROUGH * few.noise else REGISTERS):
             return
         raise NoAlignmentError(
             f"{cloud.name} does not fit the CAD: in the best pose found only {100 * share:.0f} % of its points lie within "
