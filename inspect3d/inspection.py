@@ -92,7 +92,7 @@ def check(recipe_path: Path) -> list[str]:
 
 
 def inspect(recipe: Recipe, progress: Progress) -> Record:
-    """Return the finished inspection of a recipe; a measurement that has no answer says so in its part of the record."""
+    """Return the finished inspection of a recipe; a measurement without an answer says so in its part of the record."""
     with progress.stage("reading the files"):
         jobs = _jobs(recipe)
         inputs = _inputs(recipe)

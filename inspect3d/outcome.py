@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from enum import Enum
+from enum import StrEnum
 
 
 class InspectionError(Exception):
@@ -17,7 +17,7 @@ class MeasurementError(InspectionError):
     """A measurement has no answer; the others go on (exit status 1)."""
 
 
-class Status(str, Enum):
+class Status(StrEnum):
     """How a measurement ended; a later member overrides an earlier one."""
 
     OK = "ok"
@@ -39,7 +39,7 @@ class Status(str, Enum):
 
 _WORDS = {
     Status.OK: "The measured points fix the pose of the part completely.",
-    Status.SYMMETRIC: "The CAD model is symmetric: several poses are the same answer, and the one nearest to the start was taken.",
+    Status.SYMMETRIC: "The CAD model is symmetric: of the poses that are the same answer, the nearest to the start was taken.",
     Status.FREE_MOTIONS: "The measured points leave some motions of the part free; they were held at the start.",
     Status.AMBIGUOUS: "Several different poses explain the measured points equally well; choose one in the recipe.",
     Status.FAILED: "There is no result.",

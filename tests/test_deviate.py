@@ -1,9 +1,5 @@
 """The deviation map: exact where the truth is known, and as uncertain as it says."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -14,6 +10,7 @@ from inspect3d.outcome import MeasurementError
 from inspect3d.pose import Pose
 from inspect3d.register.gauge import best_fit
 from inspect3d.register.register import Register
+from tests.jit import printed
 from tests.sheets import DEPTH, WIDTH, scanned, sheet
 
 
@@ -62,7 +59,8 @@ def test_coating_is_subtracted_and_its_uncertainty_is_added(nominal):
     painted = deviated(nominal, points, refine=False, noise=1e-4, coating=0.04, coating_sigma=0.005)
     seen = bare.deviation.observed
     np.testing.assert_allclose(painted.deviation.value[seen], bare.deviation.value[seen] - 0.04, atol=1e-9)
-    np.testing.assert_allclose(painted.deviation.sigma[seen] ** 2, bare.deviation.sigma[seen] ** 2 + 0.005**2, rtol=1e-9)
+    variance = bare.deviation.sigma[seen] ** 2 + 0.005**2
+    np.testing.assert_allclose(painted.deviation.sigma[seen] ** 2, variance, rtol=1e-9)
 
 
 def test_calibration_adds_to_every_node(nominal):
@@ -162,32 +160,20 @@ def test_points_off_the_rim_have_no_deviation(nominal):
 def test_the_fit_kernel_agrees_with_the_jit_off():
     program = """
 import numpy as np
-from tests.sheets import scanned, sheet
-from inspect3d.deviate.cloud_to_node import CloudToNode
 from inspect3d.deviate.local_fit_kernel import fit_nodes
-nodes, normals = np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]])
 random = np.random.default_rng(0)
 feet = np.concatenate([random.uniform(-1, 1, (60, 2)), np.zeros((60, 1))], axis=1)
-feet = feet[np.argsort(feet[:, 0] > 0, kind="stable")]
+shape = np.array([2, 4, 2])
+keys = ((np.floor(feet[:, 0] + 1) * shape[1] + np.floor(feet[:, 1] + 2)) * shape[2] + 1).astype(np.int64)
+order = np.argsort(keys, kind="stable")
+feet, keys = feet[order], keys[order]
 distance = 0.1 + 0.02 * feet[:, 0] - 0.03 * feet[:, 1] ** 2 + random.normal(0, 0.001, 60)
 distance[7] = 5.0
-keys = (feet[:, 0] > 0).astype(np.int64)
-shape = np.array([2, 1, 1])
-low = np.array([-1.0, -1.0, 0.0])
-cell = np.array([1.0, 2.0, 1.0])
-result = fit_nodes(nodes, normals, np.full((1, 3), 0.9), 0.001, np.array([-1.0, -2.0, -1.0]), 1.0,
-                   np.array([2, 4, 2]), np.sort(((np.floor(feet[:, 0] + 1) * 4 + np.floor(feet[:, 1] + 2)) * 2 + 1).astype(np.int64)),
-                   feet[np.argsort(((np.floor(feet[:, 0] + 1) * 4 + np.floor(feet[:, 1] + 2)) * 2 + 1), kind="stable")],
-                   np.tile(normals, (60, 1)),
-                   distance[np.argsort(((np.floor(feet[:, 0] + 1) * 4 + np.floor(feet[:, 1] + 2)) * 2 + 1), kind="stable")])
+up = np.array([[0.0, 0.0, 1.0]])
+result = fit_nodes(np.zeros((1, 3)), up, np.full((1, 3), 0.9), 0.001, np.array([-1.0, -2.0, -1.0]), 1.0, shape, keys,
+                   feet, np.tile(up, (60, 1)), distance)
 print([f"{float(part[0]):.12g}" for part in result])
 assert abs(result[0][0] - 0.1) < 0.002
 """
-    outputs = [
-        subprocess.run(
-            [sys.executable, "-c", program], env={**os.environ, "NUMBA_DISABLE_JIT": off}, capture_output=True, text=True
-        )
-        for off in ("0", "1")
-    ]
-    assert [output.returncode for output in outputs] == [0, 0], outputs[0].stderr + outputs[1].stderr
-    assert outputs[0].stdout == outputs[1].stdout
+    with_jit, without = (printed(program, jit) for jit in (True, False))
+    assert with_jit == without

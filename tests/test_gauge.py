@@ -78,7 +78,8 @@ def test_a_plane_leaves_two_shifts_and_a_turn_free_and_holds_them():
 
 
 def cylinder(radius=20.0, turns=1.0):
-    angle, z = (a.ravel() for a in np.meshgrid(np.linspace(0, 2 * np.pi * turns, 60, endpoint=False), np.linspace(0, 8, 9)))
+    angles = np.linspace(0, 2 * np.pi * turns, 60, endpoint=False)
+    angle, z = (a.ravel() for a in np.meshgrid(angles, np.linspace(0, 8, 9)))
     normals = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     return radius * normals + np.stack([0 * z + 5, 0 * z, z], axis=1), normals
 

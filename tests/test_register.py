@@ -1,9 +1,5 @@
 """Clouds found from any pose, refused where they do not fit, and named where they are not fixed."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -18,6 +14,7 @@ from inspect3d.register.landmarks import landmark_covariance, pose_from_landmark
 from inspect3d.register.mobility import jacobian
 from inspect3d.register.register import Register
 from inspect3d.register.symmetry import is_symmetry
+from tests.jit import printed
 from tests.sheets import plane, plane_normals, scanned, sheet
 
 
@@ -30,8 +27,10 @@ def box(size, subdivided=2):
         mesh = mesh.subdivide()
     surface = Surface(mesh.vertices, mesh.faces)
     count = len(mesh.vertices)
-    inspection = InspectionMesh(mesh.vertices, mesh.faces, mesh.vertex_normals, np.zeros(count, bool), np.full(count, -1))
-    return Nominal("box", surface, inspection)
+    none = np.zeros(count, bool)
+    return Nominal(
+        "box", surface, InspectionMesh(mesh.vertices, mesh.faces, mesh.vertex_normals, none, np.full(count, -1))
+    )
 
 
 def on_surface(surface, count, seed, noise=0.0):
@@ -114,7 +113,7 @@ def test_one_face_of_a_cube_leaves_six_poses_and_is_ambiguous():
 def test_a_sheet_without_relief_is_measured_with_its_motions_held():
     nominal = sheet(plane, plane_normals)
     points, _ = scanned(np.random.default_rng(1), 5000, plane, plane_normals, noise=0.01)
-    alignment = Register(nominal, start=Pose.identity())(Cloud("scan", points + [0.0, 0.0, 0.4]))
+    alignment = Register(nominal, start=Pose.identity())(Cloud("scan", points + np.array([0.0, 0.0, 0.4])))
     assert alignment.status is Status.FREE_MOTIONS
     assert len(alignment.free) == 3
     np.testing.assert_allclose(alignment.cad_from_measured.translation, [0, 0, -0.4], atol=2e-3)
@@ -199,14 +198,8 @@ descend(rotations, translations, points, none, False, np.full(10, 1.0), points.m
 print(f"{before:.12f} {translations[0, 2]:.12f}")
 assert abs(before - 0.3) < 1e-12 and abs(translations[0, 2]) < 1e-6
 """
-    outputs = [
-        subprocess.run(
-            [sys.executable, "-c", program], env={**os.environ, "NUMBA_DISABLE_JIT": off}, capture_output=True, text=True
-        )
-        for off in ("0", "1")
-    ]
-    assert [output.returncode for output in outputs] == [0, 0], outputs[1].stderr + outputs[0].stderr
-    assert outputs[0].stdout == outputs[1].stdout
+    with_jit, without = (printed(program, jit) for jit in (True, False))
+    assert with_jit == without
 
 
 def test_normals_that_point_into_the_material_do_not_hinder():

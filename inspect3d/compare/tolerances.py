@@ -14,7 +14,7 @@ def inside(region: Region, points: Floats, face: np.ndarray) -> Booleans:
     if region.box is not None:
         low, high = np.array(region.box)
         return ((points >= low) & (points <= high)).all(axis=1)
-    return np.isin(face, region.faces)
+    return np.isin(face, region.faces or ())
 
 
 def excluded(part: Part, points: Floats, face: np.ndarray) -> Booleans:

@@ -14,8 +14,8 @@ NONE, CONFORM, UNDECIDED, NONCONFORM = range(4)
 def verdict(deviation: Deviation, tolerance: Floats, probability: float) -> Integers:
     """Return 0 none, 1 conform, 2 undecided, 3 nonconform for each node, (n,).
 
-    A node conforms where its deviation lies within the tolerance by at least a guard band of u = z sigma on either side,
-    and fails where it lies beyond by as much; z is the one-sided normal quantile of the probability (1.645 at 0.95).
+    A node conforms where its deviation lies inside the tolerance by at least a guard band of z sigma, and fails where
+    it lies outside by as much; z is the one-sided normal quantile of the probability (1.645 at 0.95).
     Nodes that were not observed, or for which there is no tolerance, have none.
 
     Parameters

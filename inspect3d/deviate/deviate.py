@@ -119,7 +119,7 @@ class Deviate:
             return ()
         rule = "the reach of the recipe" if self.reach else "2 % of the CAD's diagonal, since the recipe gives no reach"
         return (
-            f"{far} of {len(feet.distance)} points lie more than {reach:.3g} mm from the CAD ({rule}) and were left out.",
+            f"{far} of {len(feet.distance)} points lie over {reach:.3g} mm from the CAD ({rule}) and were left out.",
         )
 
     def _observe(
@@ -135,8 +135,8 @@ class Deviate:
         observed = fit.observed & counted
         if np.count_nonzero(observed) < LEAST_NODES:
             raise MeasurementError(
-                f"Only {np.count_nonzero(observed)} of {len(nominal.mesh)} nodes have enough measured points around them: "
-                f"choose a larger element_size (it is {nominal.mesh.edge_length:.3g} mm), a larger reach, or scan more densely."
+                f"Only {np.count_nonzero(observed)} of {len(nominal.mesh)} nodes have enough measured points around: "
+                f"choose a larger element_size (it is {nominal.mesh.edge_length:.3g} mm), or scan more densely."
             )
         hidden = ~observed
         return replace(

@@ -10,6 +10,8 @@ import math
 import numpy as np
 from numba import njit, prange
 
+from inspect3d.arrays import Booleans, Floats, Integers
+
 QUADRATIC, LINEAR = 6, 3  # unknowns of the polynomial
 ENOUGH = 15  # points that a quadratic polynomial wants
 LEAST = 6  # points below which a node is not observed
@@ -19,15 +21,26 @@ MOST = 2000  # points used around a node; more are thinned evenly
 
 
 @njit(cache=True)
-def _span(keys, key):
+def _span(keys: Integers, key: int) -> tuple[np.int64, np.int64]:
     return np.searchsorted(keys, key), np.searchsorted(keys, key + 1)
 
 
 @njit(cache=True)
-def _gather(node, normal, radius, low, cell, shape, keys, feet, foot_normals, found):
+def _gather(
+    node: Floats,
+    normal: Floats,
+    radius: float,
+    low: Floats,
+    cell: float,
+    shape: Integers,
+    keys: Integers,
+    feet: Floats,
+    foot_normals: Floats,
+    found: Integers,
+) -> int:
     """Write the indices of the points around a node into `found`; return how many there are (they may be thinned)."""
     total = 0
-    reach = int(math.ceil(radius / cell))
+    reach = math.ceil(radius / cell)
     i0, j0, k0 = int((node[0] - low[0]) / cell), int((node[1] - low[1]) / cell), int((node[2] - low[2]) / cell)
     for sweep in range(2):
         stride = 1 if sweep == 0 else total // len(found) + 1
@@ -55,7 +68,7 @@ def _gather(node, normal, radius, low, cell, shape, keys, feet, foot_normals, fo
 
 
 @njit(cache=True)
-def _solve(columns, y, kept, unknowns, matrix, coefficients):
+def _solve(columns: Floats, y: Floats, kept: Booleans, unknowns: int, matrix: Floats, coefficients: Floats) -> float:
     """Write the least-squares polynomial of the kept points; return the variance factor of its value at the node."""
     right = np.zeros(unknowns)
     for a in range(unknowns):
@@ -99,7 +112,7 @@ def _solve(columns, y, kept, unknowns, matrix, coefficients):
 
 
 @njit(cache=True)
-def _fit(columns, y, noise, unknowns):
+def _fit(columns: Floats, y: Floats, noise: float, unknowns: int) -> tuple[float, float, float, int]:
     """Return value at the node, variance factor, sum of squared residuals, points kept; factor inf: no fit."""
     n = len(y)
     middle = np.median(y)
@@ -134,7 +147,19 @@ def _fit(columns, y, noise, unknowns):
 
 
 @njit(parallel=True, cache=True)
-def fit_nodes(nodes, normals, radii, noise, low, cell, shape, keys, feet, foot_normals, distance):
+def fit_nodes(
+    nodes: Floats,
+    normals: Floats,
+    radii: Floats,
+    noise: float,
+    low: Floats,
+    cell: float,
+    shape: Integers,
+    keys: Integers,
+    feet: Floats,
+    foot_normals: Floats,
+    distance: Floats,
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Return value (mm), variance factor, residual sum of squares (mm²) and degrees of freedom for each node.
 
     Parameters

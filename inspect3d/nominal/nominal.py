@@ -47,7 +47,7 @@ class InspectionMesh:
         """Return the area of each node, (n,) mm²: a third of every triangle around it."""
         a, b, c = (self.nodes[self.triangles[:, k]] for k in range(3))
         third = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
-        return np.bincount(self.triangles.ravel(), np.repeat(third, 3), minlength=len(self.nodes))
+        return np.bincount(self.triangles.ravel(), np.repeat(third, 3), minlength=len(self.nodes)).astype(np.float64)
 
     @cached_property
     def edge_length(self) -> float:

@@ -29,7 +29,7 @@ class Field:
 
     @classmethod
     def of(cls, surface: Surface, cells: int = 300_000, margin: float = 0.1) -> Field:
-        """Return the field of a surface on about so many cubic cells, the bounding box grown by a share of its diagonal."""
+        """Return the field of a surface on about so many cubic cells, its box grown by a share of the diagonal."""
         low, high = surface.bounds
         low, high = low - margin * surface.diagonal, high + margin * surface.diagonal
         step = float((np.prod(high - low) / cells) ** (1 / 3))

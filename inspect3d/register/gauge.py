@@ -51,7 +51,7 @@ class Gauge:
 
     @cached_property
     def _spectrum(self) -> tuple[Floats, Floats]:
-        """Stiffness of the motions, ascending, and the motions as columns (6, 6); turns counted in units of `length`."""
+        """Stiffness of the motions, ascending, and the motions as columns (6, 6); turns in units of `length`."""
         rows = self.jacobian / np.array([self.length] * 3 + [1.0] * 3)
         values, vectors = np.linalg.eigh((rows * self.weights[:, None]).T @ rows)
         return values, vectors / np.array([self.length] * 3 + [1.0] * 3)[:, None]

@@ -32,7 +32,7 @@ def pose_from_landmarks(measured: Floats, cad: Floats) -> Pose:
         widths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         if widths[1] < 1e-3 * max(widths[0], 1e-12):
             raise InputError(
-                f"The landmarks lie on one line (their `{what}` points): the turn about it stays open; add one off that line."
+                f"The `{what}` points of the landmarks lie on one line, which leaves a turn open: add one off it."
             )
     middle_measured, middle_cad = measured.mean(axis=0), cad.mean(axis=0)
     u, _, vt = np.linalg.svd((cad - middle_cad).T @ (measured - middle_measured))

@@ -31,7 +31,7 @@ def named(free: Floats, origin: Floats, length: float) -> tuple[FreeMotion, ...]
     if not len(free):
         return ()
     scaled = free * np.array([length] * 3 + [1.0] * 3)
-    u, s, vt = np.linalg.svd(scaled[:, :3].T, full_matrices=True)
+    _, s, vt = np.linalg.svd(scaled[:, :3].T, full_matrices=True)
     turning = int(np.count_nonzero(s > SMALL))
     shifts = _sparse(vt[turning:] @ scaled)
     turns = vt[:turning] @ scaled
@@ -67,16 +67,14 @@ def _turn(scaled: Floats, origin: Floats, length: float) -> FreeMotion:
     rotation, translation = scaled[:3] / length, scaled[3:]
     speed = np.linalg.norm(rotation)
     axis = _signed(rotation / speed)
-    rotation, translation = axis, translation / speed * np.sign(axis @ rotation)
+    translation = translation / speed * np.sign(axis @ rotation)
     foot = origin + np.cross(axis, translation)
     foot = foot - (foot @ axis) * axis  # the point of the axis nearest to the CAD's origin
+    where = f"about the axis along {_vector(axis, 3)} through {_vector(foot, 1)} mm"
     pitch = float(axis @ translation)
-    direction = np.concatenate([axis, translation])
     if abs(pitch) < SMALL * length:
-        direction = np.concatenate([axis, translation - pitch * axis])
-        return FreeMotion(f"turn about the axis along {_vector(axis, 3)} through {_vector(foot, 1)} mm", direction)
-    words = f"screw of {2 * np.pi * pitch:.2f} mm a turn about the axis along {_vector(axis, 3)} through {_vector(foot, 1)} mm"
-    return FreeMotion(words, direction)
+        return FreeMotion(f"turn {where}", np.concatenate([axis, translation - pitch * axis]))
+    return FreeMotion(f"screw of {2 * np.pi * pitch:.2f} mm a turn {where}", np.concatenate([axis, translation]))
 
 
 def _turns_about_a_point(turns: Floats, origin: Floats, length: float) -> list[FreeMotion]:

@@ -58,7 +58,7 @@ class Register:
         """
         if len(cloud) < LEAST_POINTS:
             raise NoAlignmentError(
-                f"{cloud.name} holds {len(cloud)} points, too few to find the part in: at least {LEAST_POINTS} are needed."
+                f"{cloud.name} holds {len(cloud)} points, too few to find the part in: {LEAST_POINTS} are needed."
             )
         centre = np.median(cloud.points, axis=0)
         near = Cloud(cloud.name, cloud.points - centre, cloud.normals, cloud.noise)
@@ -132,14 +132,14 @@ class Register:
         distance = np.abs(fit.feet.distance)
         within = distance < (self.reach or np.inf)
         near = fit.agrees & within & (distance < self._near(few))
-        return float(np.count_nonzero(near) / max(np.count_nonzero(within), 1))
+        return float(np.count_nonzero(near) / max(int(np.count_nonzero(within)), 1))
 
     def _require_fit(self, cloud: Cloud, fit: Fit, few: Thinned, candidates: tuple[Candidate, ...]) -> None:
         share = self._share(fit, few)
         if share >= (FITS if fit.scale < ROUGH * few.noise else REGISTERS):
             return
         raise NoAlignmentError(
-            f"{cloud.name} does not fit the CAD: in the best pose found only {100 * share:.0f} % of its points lie within "
+            f"{cloud.name} does not fit the CAD: in the best pose found {100 * share:.0f} % of its points lie within "
             f"{self._near(few):.2g} mm of it. Check that scan and CAD are of the same part; if much of the scan is not "
             "of the part, cut it off or give `reach`.",
             candidates=candidates,

@@ -10,11 +10,15 @@ import math
 import numpy as np
 from numba import njit, prange
 
+from inspect3d.arrays import Floats
+
 OPPOSED = 0.3  # normals whose cosine is below this do not belong to the same surface
 
 
 @njit(cache=True)
-def _look_up(point, origin, step, feet, normals, foot, normal):
+def _look_up(
+    point: Floats, origin: Floats, step: float, feet: Floats, normals: Floats, foot: Floats, normal: Floats
+) -> float:
     """Write foot and normal of the cell nearest to the point; return the distance it is known to have at least."""
     nx, ny, nz = feet.shape[0], feet.shape[1], feet.shape[2]
     i = min(max(int((point[0] - origin[0]) / step + 0.5), 0), nx - 1)
@@ -33,7 +37,7 @@ def _look_up(point, origin, step, feet, normals, foot, normal):
 
 
 @njit(cache=True)
-def _agrees(turned, normal, oriented):
+def _agrees(turned: Floats, normal: Floats, oriented: bool) -> bool:
     """Tell whether a measured normal may lie on a surface with this normal; a zero normal may lie on any."""
     length = turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2]
     if length < 0.25:
@@ -43,13 +47,24 @@ def _agrees(turned, normal, oriented):
 
 
 @njit(cache=True)
-def _apply(rotation, translation, point, moved):
+def _apply(rotation: Floats, translation: Floats, point: Floats, moved: Floats) -> None:
     for a in range(3):
         moved[a] = rotation[a, 0] * point[0] + rotation[a, 1] * point[1] + rotation[a, 2] * point[2] + translation[a]
 
 
 @njit(cache=True)
-def _cost(rotation, translation, points, point_normals, oriented, reach, origin, step, feet, normals):
+def _cost(
+    rotation: Floats,
+    translation: Floats,
+    points: Floats,
+    point_normals: Floats,
+    oriented: bool,
+    reach: float,
+    origin: Floats,
+    step: float,
+    feet: Floats,
+    normals: Floats,
+) -> float:
     moved, turned, foot, normal, zero = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.zeros(3)
     cost = 0.0
     for p in range(len(points)):
@@ -64,7 +79,18 @@ def _cost(rotation, translation, points, point_normals, oriented, reach, origin,
 
 
 @njit(parallel=True, cache=True)
-def costs(rotations, translations, points, point_normals, oriented, reach, origin, step, feet, normals):
+def costs(
+    rotations: Floats,
+    translations: Floats,
+    points: Floats,
+    point_normals: Floats,
+    oriented: bool,
+    reach: float,
+    origin: Floats,
+    step: float,
+    feet: Floats,
+    normals: Floats,
+) -> Floats:
     """Return the mean of min(distance / reach, 1) for each pose (k,); normals that disagree cost 1."""
     result = np.empty(len(rotations))
     for h in prange(len(rotations)):
@@ -75,7 +101,7 @@ def costs(rotations, translations, points, point_normals, oriented, reach, origi
 
 
 @njit(cache=True)
-def solve_spd(matrix, right):
+def solve_spd(matrix: Floats, right: Floats) -> Floats:
     """Return the solution of a small symmetric positive definite system, by Cholesky, in place of `matrix`."""
     n = len(right)
     for i in range(n):
@@ -96,7 +122,7 @@ def solve_spd(matrix, right):
 
 
 @njit(cache=True)
-def _rotation_of(vector, rotation):
+def _rotation_of(vector: Floats, rotation: Floats) -> None:
     """Write the rotation matrix of a rotation vector (Rodrigues)."""
     angle = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     if angle < 1e-12:
@@ -114,8 +140,19 @@ def _rotation_of(vector, rotation):
 
 @njit(cache=True)
 def _descend(
-    rotation, translation, points, point_normals, oriented, reaches, centre, length, origin, step, feet, normals
-):
+    rotation: Floats,
+    translation: Floats,
+    points: Floats,
+    point_normals: Floats,
+    oriented: bool,
+    reaches: Floats,
+    centre: Floats,
+    length: float,
+    origin: Floats,
+    step: float,
+    feet: Floats,
+    normals: Floats,
+) -> None:
     """Improve one pose in place: a truncated point-to-plane step for each reach."""
     moved, turned, foot, normal, zero = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.zeros(3)
     middle, row, turn, new = np.empty(3), np.empty(6), np.empty((3, 3)), np.empty((3, 3))
@@ -167,8 +204,19 @@ def _descend(
 
 @njit(parallel=True, cache=True)
 def descend(
-    rotations, translations, points, point_normals, oriented, reaches, centre, length, origin, step, feet, normals
-):
+    rotations: Floats,
+    translations: Floats,
+    points: Floats,
+    point_normals: Floats,
+    oriented: bool,
+    reaches: Floats,
+    centre: Floats,
+    length: float,
+    origin: Floats,
+    step: float,
+    feet: Floats,
+    normals: Floats,
+) -> None:
     """Improve each pose of a stack in place by truncated point-to-plane steps, one for each of `reaches` (mm)."""
     for h in prange(len(rotations)):
         _descend(
