@@ -203,6 +203,19 @@ def test_an_edge_of_three_triangles_has_the_sum_of_their_normals():
     assert not surface.closed
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_any_heap_of_triangles_has_exact_distances_and_unit_normals(seed):
+    """Triangles that cross, repeat, collapse and share edges by many, on whole numbers so that much ties."""
+    rng = np.random.default_rng(seed)
+    vertices = rng.integers(-4, 5, (20, 3)).astype(float)
+    vertices[:, 2] *= 1e-7 ** (seed % 2)
+    triangles = rng.integers(0, 20, (40, 3))
+    points = np.concatenate([rng.normal(size=(200, 3)) * 8, rng.integers(-5, 6, (100, 3)), vertices])
+    feet = Surface(vertices, triangles).closest(points)
+    np.testing.assert_allclose(np.abs(feet.distance), brute_distances(points, vertices, triangles), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(feet.normals, axis=1), 1, rtol=0, atol=1e-12)
+
+
 def test_one_triangle_is_a_surface():
     surface = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     feet = surface.closest([[0.2, 0.2, 3.0], [0.2, 0.2, -3.0], [3.0, 0, 4.0], [-3.0, -4.0, 1e-3]])
