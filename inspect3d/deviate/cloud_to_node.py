@@ -39,7 +39,8 @@ class CloudToNode:
     by the mesh, and grows where they are few.
 
     The variance is s² times the first entry of (A'A)⁻¹, with s² pooled from the node's own scatter and the noise of
-    the cloud, which counts as `prior` further points.
+    the cloud, which counts as `prior` further points. A node that lies beyond the edge of the scan is not observed: an
+    extrapolated value is not a measured one.
 
     Parameters
     ----------

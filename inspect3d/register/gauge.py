@@ -13,6 +13,7 @@ from inspect3d.register.mobility import jacobian, spread
 MAD = 1.4826
 TUKEY = 4.685
 FREE = 1e-3  # share of the stiffest motion's stiffness below which a motion is free
+SOFT = 1e-2  # share below which the nodes of a map do not decide on a motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,14 +70,20 @@ class Gauge:
     @cached_property
     def inverse(self) -> Floats:
         """Return (J' W J)⁺, (6, 6), with the free directions left out."""
+        return self._inverse(FREE)
+
+    def _inverse(self, least: float) -> Floats:
         values, vectors = self._spectrum
-        held = values >= FREE * values[-1]
-        return (vectors[:, held] / values[held]) @ vectors[:, held].T
+        stiff = values >= least * values[-1]
+        return (vectors[:, stiff] / values[stiff]) @ vectors[:, stiff].T
 
     @cached_property
     def solver(self) -> Floats:
-        """Return M = (J' W J)⁺ J' W, (6, n): the rigid motion in a deviation field."""
-        return self.inverse @ (self.jacobian * self.weights[:, None]).T
+        """Return M = (J' W J)⁺ J' W, (6, n): the rigid motion in a deviation field.
+
+        Motions softer than a hundredth of the stiffest are left to the points, which hold them better than the nodes.
+        """
+        return self._inverse(SOFT) @ (self.jacobian * self.weights[:, None]).T
 
     def motion(self, values: Floats) -> Floats:
         """Return the small motion (6,) of the measured points that best undoes a deviation field (n,) mm."""
@@ -91,6 +98,19 @@ class Gauge:
         common = (self.solver * independent) @ self.solver.T
         cross = np.einsum("ij,ji->i", self.jacobian, self.solver) * independent
         return independent - 2 * cross + np.einsum("ij,jk,ik->i", self.jacobian, common, self.jacobian)
+
+    def soft_variances(self, covariance: Floats) -> Floats:
+        """Return what the motions that are left to the points add to the variance of each node, (n,) mm².
+
+        Parameters
+        ----------
+        covariance : (6, 6) of the pose as the points give it, about `origin`
+        """
+        values, vectors = self._spectrum
+        soft = (values >= FREE * values[-1]) & (values < SOFT * values[-1])
+        rows = self.jacobian @ vectors[:, soft]
+        back = np.linalg.inv(vectors)[soft]
+        return np.einsum("ij,jk,ik->i", rows, back @ covariance @ back.T, rows)
 
     def covariance(self, residuals: Floats, block: float) -> Floats:
         """Return the covariance (6, 6) of the motion, from a sandwich over spatial blocks.

@@ -45,6 +45,9 @@ class RobustIcp:
     """Iterative closest points on a surface: feet by `Surface.closest`, motion by Open3D's point-to-plane estimator
     with Tukey's kernel, whose width falls to that of the noise.
 
+    A uniform offset that no rigid motion explains (paint, a cylinder cut too large) is taken out of the distances where
+    `level` is set: a ring that is too large would else lean over to fit.
+
     Twelve weightless pairs ("anchors") around the cloud keep a motion that nothing determines at rest: they shrink the
     step by a part in a thousand, not the answer.
 
@@ -53,33 +56,37 @@ class RobustIcp:
     steps : at the most
     still : share of the robust scale below which the largest motion of a point ends the iteration
     first_width : half width of the kernel in the first step, mm; None starts at the noise
-    least_scale : the scale is not taken smaller than this, mm
+    level : measure the distances from their median, once a first step has been made
     """
 
     steps: int = 60
     still: float = 1e-3
     first_width: float | None = None
-    least_scale: float = 1e-6
+    level: bool = False
 
     def __call__(self, cloud: Thinned, surface: Surface, start: Pose) -> Fit:
         """Return the fit that the iteration from `start` (cad_from_cloud) ends in."""
         pose, width = start, self.first_width or np.inf
-        for _ in range(self.steps):
-            fit = fitted(cloud, surface, pose, self.least_scale)
-            width = max(min(0.7 * width, width), TUKEY * fit.scale) if np.isfinite(width) else TUKEY * fit.scale
-            part = fit.agrees & ~fit.feet.on_rim & (np.abs(fit.feet.distance) < width)
+        for count in range(self.steps):
+            fit = fitted(cloud, surface, pose)
+            valid = fit.agrees & ~fit.feet.on_rim
+            offset = float(np.median(fit.feet.distance[valid])) if self.level and count and valid.any() else 0.0
+            distance = np.abs(fit.feet.distance - offset)
+            scale = MAD * float(np.median(distance[valid])) if valid.any() else fit.scale
+            width = max(0.7 * width, TUKEY * scale) if np.isfinite(width) else TUKEY * scale
+            part = valid & (distance < width)
             if np.count_nonzero(part) < 6:
                 return fit
-            points = pose(cloud.points[part])
-            motion = step(points, fit.feet.points[part], fit.feet.normals[part], width)
+            points, normals = pose(cloud.points[part]), fit.feet.normals[part]
+            motion = step(points, fit.feet.points[part] + offset * normals, normals, width)
             pose = motion @ pose
             moved = np.abs(motion(points) - points).max()
-            if moved < self.still * fit.scale and width <= 1.01 * TUKEY * fit.scale:
+            if moved < self.still * scale and width <= 1.01 * TUKEY * scale:
                 break
-        return fitted(cloud, surface, pose, self.least_scale)
+        return fitted(cloud, surface, pose)
 
 
-def fitted(cloud: Thinned, surface: Surface, pose: Pose, least_scale: float = 0.0) -> Fit:
+def fitted(cloud: Thinned, surface: Surface, pose: Pose) -> Fit:
     """Return how the points lie on the surface in a given pose."""
     feet = surface.closest(pose(cloud.points))
     cosine = np.einsum("ni,ni->n", pose.turned(cloud.normals), feet.normals)
@@ -87,7 +94,7 @@ def fitted(cloud: Thinned, surface: Surface, pose: Pose, least_scale: float = 0.
     agrees = ~told | ((cosine if cloud.oriented else np.abs(cosine)) > OPPOSED)
     part = agrees & ~feet.on_rim
     distance = np.abs(feet.distance[part]) if part.any() else np.array([surface.diagonal])
-    return Fit(pose, feet, agrees, max(float(MAD * np.median(distance)), least_scale))
+    return Fit(pose, feet, agrees, float(MAD * np.median(distance)))
 
 
 def step(points: Floats, feet: Floats, normals: Floats, width: float) -> Pose:
@@ -115,3 +122,9 @@ def _anchors(length: float) -> tuple[Floats, Floats]:
     pairs = [(side * length * axes[k], axes[j]) for k in range(3) for j in range(3) if j != k for side in (1.0, -1.0)]
     places, directions = zip(*pairs, strict=True)
     return np.array(places), np.array(directions)
+
+
+def median_and_scale(distances: Floats) -> tuple[float, float]:
+    """Return the median of distances (n,) and 1.4826 times the median absolute deviation about it, mm."""
+    middle = float(np.median(distances))
+    return middle, float(MAD * np.median(np.abs(distances - middle)))

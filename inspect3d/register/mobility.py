@@ -18,6 +18,13 @@ def jacobian(points: Floats, normals: Floats, origin: Floats) -> Floats:
     return np.concatenate([np.cross(points - origin, normals), normals], axis=1)
 
 
+def about(covariance: Floats, origin: Floats, other: Floats) -> Floats:
+    """Return the covariance (6, 6) of a motion about `origin` (3,) mm as that of the same motion about `other`."""
+    shift = np.eye(6)
+    shift[3:, :3] = -_cross_matrix(other - origin)
+    return shift @ covariance @ shift.T
+
+
 def spread(points: Floats, weights: Floats, origin: Floats) -> float:
     """Return the weighted root mean square distance of the points from the origin, mm."""
     return float(np.sqrt(np.average(((points - origin) ** 2).sum(axis=1), weights=weights))) or 1.0
@@ -60,7 +67,7 @@ def _sparse(shifts: Floats) -> Floats:
 
 def _shift(motion: Floats) -> FreeMotion:
     direction = _signed(unit(motion[3:]))
-    return FreeMotion(f"shift along {_vector(direction, 3)}", np.concatenate([np.zeros(3), direction]))
+    return FreeMotion(f"shift along {_vector(direction, 2)}", np.concatenate([np.zeros(3), direction]))
 
 
 def _turn(scaled: Floats, origin: Floats, length: float) -> FreeMotion:
@@ -70,7 +77,7 @@ def _turn(scaled: Floats, origin: Floats, length: float) -> FreeMotion:
     translation = translation / speed * np.sign(axis @ rotation)
     foot = origin + np.cross(axis, translation)
     foot = foot - (foot @ axis) * axis  # the point of the axis nearest to the CAD's origin
-    where = f"about the axis along {_vector(axis, 3)} through {_vector(foot, 1)} mm"
+    where = f"about the axis along {_vector(axis, 2)} through {_vector(foot, 1)} mm"
     pitch = float(axis @ translation)
     if abs(pitch) < SMALL * length:
         return FreeMotion(f"turn {where}", np.concatenate([axis, translation - pitch * axis]))
