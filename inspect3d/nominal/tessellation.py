@@ -9,6 +9,10 @@ import numpy as np
 
 from inspect3d.arrays import Floats, Integers
 from inspect3d.nominal.brep import Brep
+from inspect3d.outcome import InputError
+
+
+_SAMPLE = 5000
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,22 +40,58 @@ class Tessellation:
     segment_edge: Integers
     segment_t: Floats
 
+    def chord(self) -> float:
+        """Return the largest distance from the middles of the triangles to the exact faces, mm, over a sample of them.
 
-def tessellated(brep: Brep, deflection: float, angle: float = 0.2) -> Tessellation:
-    """Triangulate the faces with chords below `deflection` mm and turns below `angle` rad, and join them along their edges.
+        The sample holds the largest triangles and others evenly spread.
+        """
+        corners = self.vertices[self.triangles]
+        area2 = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        every = max(1, len(area2) // _SAMPLE)
+        sample = np.unique(np.concatenate([np.argsort(area2)[-_SAMPLE:], np.arange(0, len(area2), every)]))
+        middles = corners[sample].mean(axis=1)
+        feet, _ = self.brep.project(middles, self.face[sample], self.uv[sample].mean(axis=1))
+        return float(np.linalg.norm(feet - middles, axis=1).max())
 
-    Faces that meet in an edge share its discretisation, so that the triangles close where the model closes.
+
+def tessellated(brep: Brep, deflection: float, angle: float = 0.3) -> Tessellation:
+    """Triangulate the faces with chords below `deflection` mm and turns below `angle` rad, and join them along edges.
+
+    Faces that meet in an edge share its discretisation, so that the triangles close where the model closes. A face
+    that cannot be triangulated is missing.
+
+    Raises
+    ------
+    InputError
+        No face can be triangulated.
     """
+    # Delabella is quicker and makes fewer folds; what it cannot do, the default often can.
+    joined = _joined(brep, deflection, angle, "Delabella")
+    if len(joined.triangles) < len(brep.faces):
+        other = _joined(brep, deflection, angle, "Watson")
+        joined = max(joined, other, key=lambda join: len(join.triangles))
+    if not joined.triangles:
+        raise InputError("None of the model's faces can be triangulated; export it again from the CAD system.")
+    return joined.tessellation()
+
+
+def _joined(brep: Brep, deflection: float, angle: float, algorithm: str) -> _Join:
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.BRepTools import BRepTools
+    from OCP.IMeshTools import IMeshTools_MeshAlgoType, IMeshTools_Parameters
+    from OCP.Message import Message_ProgressRange
 
+    parameters = IMeshTools_Parameters()
+    parameters.Deflection, parameters.Angle, parameters.MinSize = deflection, angle, deflection
+    parameters.MeshAlgo = getattr(IMeshTools_MeshAlgoType, f"IMeshTools_MeshAlgoType_{algorithm}")
+    parameters.InParallel = True
     BRepTools.Clean_s(brep.shape)
-    BRepMesh_IncrementalMesh(brep.shape, deflection, False, angle, True)
+    BRepMesh_IncrementalMesh(brep.shape, parameters, Message_ProgressRange())
     joined = _Join(brep)
     for number in range(1, len(brep.faces) + 1):
         joined.add(number)
     BRepTools.Clean_s(brep.shape)
-    return joined.tessellation()
+    return joined
 
 
 class _Join:
@@ -74,6 +114,7 @@ class _Join:
         self.segments: list[tuple[Integers, Integers, Floats]] = []
 
     def add(self, number: int) -> None:
+        """Take in the triangles of a face, if it has any."""
         from OCP.BRep import BRep_Tool
         from OCP.TopAbs import TopAbs_Orientation
         from OCP.TopLoc import TopLoc_Location
