@@ -17,7 +17,7 @@ from inspect3d.pose import Pose
 from inspect3d.register.alignment import Alignment
 from inspect3d.register.gauge import Gauge, best_fit
 from inspect3d.register.icp import TUKEY, median_and_scale
-from inspect3d.register.mobility import about, jacobian
+from inspect3d.register.mobility import jacobian
 
 FOREIGN = 0.02  # share of the CAD's diagonal beyond which a point is foreign, unless the recipe gives a reach
 SETTLED = 0.02  # share of the usual uncertainty below which the last motion of a node ends the alignment
@@ -153,12 +153,12 @@ class Deviate:
         local = fit.variance[seen]
         coating = np.full(len(seen), self.coating_sigma)
         if self.refine:
-            pose = about(alignments[0].covariance, alignments[0].origin, gauge.origin)
-            value, variance = gauge(value), gauge.variances(local) + gauge.soft_variances(pose) + gauge(coating) ** 2
+            value = value + gauge.jacobian @ gauge.motion(value)
+            variance = gauge.variances(local) + gauge(coating) ** 2
         else:
             rows = jacobian(gauge.nodes, gauge.normals, alignments[0].origin)
             variance = local + np.einsum("ij,jk,ik->i", rows, alignments[0].covariance, rows) + coating**2
-        variance = variance + self.calibration**2 + nominal.chord**2 / 12
+        variance = variance + self.calibration**2 + nominal.chord**2 / 3
         full_value, full_sigma = np.full(len(fit.value), np.nan), np.full(len(fit.value), np.nan)
         full_value[seen], full_sigma[seen] = value, np.sqrt(variance)
         return Deviation(full_value, full_sigma, fit.observed)

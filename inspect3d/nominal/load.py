@@ -17,7 +17,8 @@ from inspect3d.outcome import InputError
 
 _ELEMENTS_PER_DIAGONAL = 60
 _CHORD_PER_DIAGONAL = 1e-5
-_MOST_TRIANGLES = 2_000_000
+_FEW_TRIANGLES, _MOST_TRIANGLES = 60_000, 2_000_000
+_FINER = 8.0  # by which a surface of few triangles is made finer: the number grows in proportion at the most
 _MILLIMETRES = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "inch": 25.4, "ft": 304.8}
 
 
@@ -54,7 +55,7 @@ def load_nominal(
 
 def _exact(path: Path, name: str, element_size: float | None, flip: bool) -> Nominal:
     brep = read_brep(path)
-    size = element_size or brep.diagonal / _ELEMENTS_PER_DIAGONAL
+    size = element_size or _diagonal(brep) / _ELEMENTS_PER_DIAGONAL
     rough = tessellated(brep, size / 50)
     is_open = not Surface(rough.vertices, rough.triangles).closed
     if flip and is_open:
@@ -67,10 +68,18 @@ def _exact(path: Path, name: str, element_size: float | None, flip: bool) -> Nom
     return Nominal(name, surface, mesh, fine.chord(), remarks, brep, fine.face)
 
 
+def _diagonal(brep: Brep) -> float:
+    """Return the diagonal of the bounding box to a part in a thousand, mm."""
+    mesh = tessellated(brep, 1e-3 * brep.diagonal)
+    return Surface(mesh.vertices, mesh.triangles).diagonal
+
+
 def _fine(brep: Brep) -> Tessellation:
     """Return a tessellation fine enough to stand for the exact surface, but not of unwieldy size."""
     deflection = _CHORD_PER_DIAGONAL * brep.diagonal
     fine = tessellated(brep, deflection)
+    if len(fine.triangles) < _FEW_TRIANGLES:
+        return tessellated(brep, deflection / _FINER)
     while len(fine.triangles) > _MOST_TRIANGLES:
         deflection *= 2 * len(fine.triangles) / _MOST_TRIANGLES
         fine = tessellated(brep, deflection)

@@ -13,7 +13,8 @@ from inspect3d.register.mobility import jacobian, spread
 MAD = 1.4826
 TUKEY = 4.685
 FREE = 1e-3  # share of the stiffest motion's stiffness below which a motion is free
-SOFT = 1e-2  # share below which the nodes of a map do not decide on a motion
+SOFT = 1e-2  # share of the stiffest motion's stiffness below which a motion is soft
+OFFSET = 3.0  # robust scales that a uniform deviation must have to count as one
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +27,13 @@ class Gauge:
     ----------
     nodes, normals : (n, 3) of the observed nodes, mm
     weights : (n,) W, area times robust weight
+    offset : mm, uniform deviation that no rigid motion explains; 0 unless it is far larger than the other deviations
     """
 
     nodes: Floats
     normals: Floats
     weights: Floats
+    offset: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", floats(self.weights, "weights", len(self.nodes)))
@@ -79,15 +82,17 @@ class Gauge:
 
     @cached_property
     def solver(self) -> Floats:
-        """Return M = (J' W J)⁺ J' W, (6, n): the rigid motion in a deviation field.
-
-        Motions softer than a hundredth of the stiffest are left to the points, which hold them better than the nodes.
-        """
-        return self._inverse(SOFT) @ (self.jacobian * self.weights[:, None]).T
+        """Return M = (J' W J)⁺ J' W, (6, n): the rigid motion in a deviation field."""
+        return self.inverse @ (self.jacobian * self.weights[:, None]).T
 
     def motion(self, values: Floats) -> Floats:
-        """Return the small motion (6,) of the measured points that best undoes a deviation field (n,) mm."""
-        return -self.solver @ values
+        """Return the small motion (6,) of the measured points that best undoes a deviation field (n,) mm.
+
+        A part that is too large all over, as a ring of too large a diameter, would lean over to fit the better: the
+        `offset` it has left when the stiff motions are made does not count for the soft ones.
+        """
+        soft = self.inverse - self._inverse(SOFT)
+        return -self.solver @ values + self.offset * soft @ (self.jacobian.T @ self.weights)
 
     def __call__(self, values: Floats) -> Floats:
         """Return G v: fields (n,) or (n, k) without their rigid motion."""
@@ -98,19 +103,6 @@ class Gauge:
         common = (self.solver * independent) @ self.solver.T
         cross = np.einsum("ij,ji->i", self.jacobian, self.solver) * independent
         return independent - 2 * cross + np.einsum("ij,jk,ik->i", self.jacobian, common, self.jacobian)
-
-    def soft_variances(self, covariance: Floats) -> Floats:
-        """Return what the motions that are left to the points add to the variance of each node, (n,) mm².
-
-        Parameters
-        ----------
-        covariance : (6, 6) of the pose as the points give it, about `origin`
-        """
-        values, vectors = self._spectrum
-        soft = (values >= FREE * values[-1]) & (values < SOFT * values[-1])
-        rows = self.jacobian @ vectors[:, soft]
-        back = np.linalg.inv(vectors)[soft]
-        return np.einsum("ij,jk,ik->i", rows, back @ covariance @ back.T, rows)
 
     def covariance(self, residuals: Floats, block: float) -> Floats:
         """Return the covariance (6, 6) of the motion, from a sandwich over spatial blocks.
@@ -153,7 +145,14 @@ def best_fit(nodes: Floats, normals: Floats, areas: Floats, values: Floats, step
         remains = Gauge(nodes, normals, weights)(values)
         if settled:
             break
-    return Gauge(nodes, normals, weights)
+    return Gauge(nodes, normals, weights, _offset(remains, areas))
+
+
+def _offset(values: Floats, areas: Floats) -> float:
+    """Return the median of values (n,) mm, or 0 where it does not stand out of their scatter."""
+    middle = _weighted_median(values, areas)
+    scatter = MAD * _weighted_median(np.abs(values - middle), areas)
+    return middle if abs(middle) > OFFSET * scatter else 0.0
 
 
 def _weighted_median(values: Floats, weights: Floats) -> float:

@@ -18,13 +18,6 @@ def jacobian(points: Floats, normals: Floats, origin: Floats) -> Floats:
     return np.concatenate([np.cross(points - origin, normals), normals], axis=1)
 
 
-def about(covariance: Floats, origin: Floats, other: Floats) -> Floats:
-    """Return the covariance (6, 6) of a motion about `origin` (3,) mm as that of the same motion about `other`."""
-    shift = np.eye(6)
-    shift[3:, :3] = -_cross_matrix(other - origin)
-    return shift @ covariance @ shift.T
-
-
 def spread(points: Floats, weights: Floats, origin: Floats) -> float:
     """Return the weighted root mean square distance of the points from the origin, mm."""
     return float(np.sqrt(np.average(((points - origin) ** 2).sum(axis=1), weights=weights))) or 1.0

@@ -75,9 +75,9 @@ def _of_the_points(record: Record, part: MeasuredPart) -> list[Contribution]:
     if record.nominal.chord > 0:
         chord = record.nominal.chord
         words = (
-            f"the triangles that stand for the CAD surface lie up to {_micro(chord)} off it; rectangular distribution"
+            f"the triangles that stand for the CAD surface lie up to {_micro(chord)} off it, on one side"
         )
-        found.append(Contribution("CAD tessellation", _micro(chord / np.sqrt(12.0)), words))
+        found.append(Contribution("CAD tessellation", _micro(chord / np.sqrt(3.0)), words))
     return found
 
 
