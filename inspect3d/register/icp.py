@@ -15,6 +15,7 @@ from inspect3d.system import import_open3d
 MAD = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 TUKEY = 4.685  # scales at which Tukey's biweight rejects: 95 % efficient for normal noise
 OPPOSED = 0.2
+LEANING = 1.5  # robust scales that the median distance must have to be called an offset
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,9 +46,6 @@ class RobustIcp:
     """Iterative closest points on a surface: feet by `Surface.closest`, motion by Open3D's point-to-plane estimator
     with Tukey's kernel, whose width falls to that of the noise.
 
-    A uniform offset that no rigid motion explains (paint, a cylinder cut too large) is taken out of the distances where
-    `level` is set: a ring that is too large would else lean over to fit.
-
     Twelve weightless pairs ("anchors") around the cloud keep a motion that nothing determines at rest: they shrink the
     step by a part in a thousand, not the answer.
 
@@ -56,34 +54,48 @@ class RobustIcp:
     steps : at the most
     still : share of the robust scale below which the largest motion of a point ends the iteration
     first_width : half width of the kernel in the first step, mm; None starts at the noise
-    level : measure the distances from their median, once a first step has been made
+    offset : mm, distance from the surface that the points are brought to
     """
 
     steps: int = 60
     still: float = 1e-3
     first_width: float | None = None
-    level: bool = False
+    offset: float = 0.0
 
     def __call__(self, cloud: Thinned, surface: Surface, start: Pose) -> Fit:
         """Return the fit that the iteration from `start` (cad_from_cloud) ends in."""
         pose, width = start, self.first_width or np.inf
-        for count in range(self.steps):
+        for _ in range(self.steps):
             fit = fitted(cloud, surface, pose)
             valid = fit.agrees & ~fit.feet.on_rim
-            offset = float(np.median(fit.feet.distance[valid])) if self.level and count and valid.any() else 0.0
-            distance = np.abs(fit.feet.distance - offset)
+            distance = np.abs(fit.feet.distance - self.offset)
             scale = MAD * float(np.median(distance[valid])) if valid.any() else fit.scale
             width = max(0.7 * width, TUKEY * scale) if np.isfinite(width) else TUKEY * scale
             part = valid & (distance < width)
             if np.count_nonzero(part) < 6:
                 return fit
             points, normals = pose(cloud.points[part]), fit.feet.normals[part]
-            motion = step(points, fit.feet.points[part] + offset * normals, normals, width)
+            motion = step(points, fit.feet.points[part] + self.offset * normals, normals, width)
             pose = motion @ pose
             moved = np.abs(motion(points) - points).max()
             if moved < self.still * scale and width <= 1.01 * TUKEY * scale:
                 break
         return fitted(cloud, surface, pose)
+
+
+def settled(cloud: Thinned, surface: Surface, start: Pose) -> Fit:
+    """Return the fit of robust ICP from a start near the end, uniform offsets considered.
+
+    A part that is too large all over, as a ring of too large a diameter, leans over to lie closer to the CAD. If the
+    distances stand out from zero in the first fit, the points are brought to their median instead, and so twice again.
+    """
+    fit = RobustIcp(still=0.01)(cloud, surface, start)
+    for _ in range(3):
+        middle, scatter = median_and_scale(fit.feet.distance[fit.agrees & ~fit.feet.on_rim])
+        if abs(middle) < LEANING * scatter:
+            break
+        fit = RobustIcp(still=0.01, offset=middle)(cloud, surface, fit.pose)
+    return fit
 
 
 def fitted(cloud: Thinned, surface: Surface, pose: Pose) -> Fit:

@@ -16,7 +16,7 @@ from inspect3d.register.blind import BlindStart
 from inspect3d.register.choice import Choice, free_in
 from inspect3d.register.field import Field
 from inspect3d.register.gauge import Gauge
-from inspect3d.register.icp import TUKEY, Fit, RobustIcp, fitted, median_and_scale
+from inspect3d.register.icp import TUKEY, Fit, RobustIcp, fitted, median_and_scale, settled
 from inspect3d.register.mobility import named, spread
 from inspect3d.register.smooth import Smooth
 from inspect3d.register.thinned import Thinned, thinned
@@ -151,12 +151,12 @@ class Register:
         many = thinned(cloud, MANY, even=False)
         width = min(0.05 * self.nominal.diagonal, self.reach or np.inf)
         rough = RobustIcp(first_width=width)(many.every(max(len(many.points) // FEW, 1)), self.nominal.surface, start)
-        fit = RobustIcp(still=0.01, level=True)(many, self.nominal.surface, rough.pose)
+        fit = settled(many, self.nominal.surface, rough.pose)
         self._require_fit(cloud, fit, many, ())
         return fit.pose
 
     def _fine(self, cloud: Cloud, start: Pose) -> Pose:
-        return RobustIcp(still=0.01, level=True)(thinned(cloud, MANY, even=False), self.nominal.surface, start).pose
+        return settled(thinned(cloud, MANY, even=False), self.nominal.surface, start).pose
 
     @staticmethod
     def _status(choice: Choice) -> Status:
