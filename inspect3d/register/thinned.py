@@ -43,9 +43,9 @@ class Thinned:
 def thinned(cloud: Cloud, count: int, even: bool = True, seed: int = 0) -> Thinned:
     """Return about `count` points of the cloud, with normals.
 
-    Even: space is divided into cells, and the point nearest to the mean of each well-filled cell is taken. Otherwise they
-    are drawn at random, as dense as the cloud. Normals are the direction of least scatter of the 16 nearest points,
-    signed by the cloud's own normals where it has them.
+    Even: space is divided into cells, and the point nearest to the mean of each well-filled cell is taken. Otherwise
+    they are drawn at random, as dense as the cloud. Normals are the direction of least scatter of the 16 nearest
+    points, signed by the cloud's own normals where it has them.
     """
     points = cloud.points
     random = np.random.default_rng(seed)

@@ -74,9 +74,7 @@ def _of_the_points(record: Record, part: MeasuredPart) -> list[Contribution]:
         found.append(Contribution("alignment", _micro(float(np.median(sigma))), words))
     if record.nominal.chord > 0:
         chord = record.nominal.chord
-        words = (
-            f"the triangles that stand for the CAD surface lie up to {_micro(chord)} off it, on one side"
-        )
+        words = f"the triangles that stand for the CAD surface lie up to {_micro(chord)} off it, on one side"
         found.append(Contribution("CAD tessellation", _micro(chord / np.sqrt(3.0)), words))
     return found
 
