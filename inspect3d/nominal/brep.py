@@ -12,6 +12,11 @@ import numpy as np
 from inspect3d.arrays import Booleans, Floats, Integers, floats, unit
 from inspect3d.nominal.closest_parameters import closest_parameters
 
+_OWNED = 5e-7
+_COMPASS = np.stack([np.cos(np.arange(8) * np.pi / 4), np.sin(np.arange(8) * np.pi / 4)], axis=1)
+_HAIRS = (np.zeros(2), *(length * direction for length in (1e-5, 1e-3, 2e-2) for direction in _COMPASS))
+"""Steps in mm to try from a border, the shortest first."""
+
 
 @dataclass(frozen=True, eq=False)
 class Brep:
@@ -115,6 +120,25 @@ class Brep:
             within[members] = [state != TopAbs_State.TopAbs_OUT for state in states]
         return within
 
+    def owned(self, face: int, uv: Floats) -> Floats:
+        """Return the point (3,) at the parameters uv (2,) on the border of a face, or one a hair within the face.
+
+        Where a face gapes from its edges, OpenCASCADE measures from a point on its border to the edge, not to the face.
+        """
+        from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
+        from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+        from OCP.gp import gp_Pnt, gp_Vec
+
+        surface, point, along_u, along_v = self.surfaces[face - 1], gp_Pnt(), gp_Vec(), gp_Vec()
+        surface.D1(uv[0], uv[1], point, along_u, along_v)
+        per_millimetre = 1.0 / np.maximum([along_u.Magnitude(), along_v.Magnitude()], 1e-12)
+        for step in _HAIRS:
+            near = surface.Value(*(uv + step * per_millimetre))
+            vertex = BRepBuilderAPI_MakeVertex(near).Vertex()
+            if BRepExtrema_DistShapeShape(vertex, self.faces[face - 1]).Value() < _OWNED:
+                return np.array(near.Coord())
+        return np.array(point.Coord())
+
     def _by_face(self, face: Integers, uv: Floats, evaluate: Callable[[Any, list], np.ndarray]) -> Floats:
         values = np.empty((len(uv), 3))
         for number, members in _groups(face):
@@ -153,7 +177,7 @@ def _natural_normals(surface: Any, uv: Sequence[tuple[float, float]]) -> np.ndar
         surface.D1(u, v, point, along_u, along_v)
         row[0], row[1] = along_u.Coord(), along_v.Coord()
     normals = np.cross(unit(rows[:, 0]), unit(rows[:, 1]))
-    for pole in np.flatnonzero(np.linalg.norm(normals, axis=1) < 1e-6):
+    for pole in np.flatnonzero(np.linalg.norm(normals, axis=1) < 1e-6).tolist():
         normals[pole] = _limit_normal(surface, *uv[pole])
     return unit(normals)
 

@@ -15,8 +15,8 @@ _STEPS = 30
 def closest_parameters(surface: Any, points: Floats, guess: Floats) -> Floats:
     """Return the parameters (n, 2) of the points of a surface that are closest to points.
 
-    Newton's method on |S(u, v) - p|² / 2 from the guess, for all points at once; Gauss-Newton where the Hessian is not positive
-    definite (beyond a centre of curvature); a step that leads away from the point is halved.
+    Newton's method on |S(u, v) - p|² / 2 from the guess, for all points at once; Gauss-Newton where the Hessian is not
+    positive definite (beyond a centre of curvature); a step that leads away from the point is halved.
 
     Parameters
     ----------
@@ -41,7 +41,8 @@ def closest_parameters(surface: Any, points: Floats, guess: Floats) -> Floats:
         a, b, c = e + _dot(r, s_uu), f + _dot(r, s_uv), g + _dot(r, s_vv)
         convex = (a > 0) & (a * c - b * b > 1e-12 * e * g)
         a, b, c = (np.where(convex, full, gauss) for full, gauss in ((a, e), (b, f), (c, g)))
-        step = np.clip(-_solved(a, b, c, gradient), -longest, longest)
+        step = -_solved(a, b, c, gradient)
+        step /= np.maximum(1.0, (np.abs(step) / longest).max(axis=1, keepdims=True))
         halfway = (uv[active] + best[active]) / 2
         moved = np.where(closer[:, None], np.clip(uv[active] + step, low, high), halfway)
         change = np.abs(moved - best[active])

@@ -41,7 +41,7 @@ def mesh_on_brep(tessellation: Tessellation, size: float) -> tuple[InspectionMes
 
 
 def mesh_on_surface(surface: Surface, size: float) -> tuple[InspectionMesh, tuple[str, ...]]:
-    """Return an inspection mesh with edges of about `size` mm whose nodes lie on a triangulated surface, and remarks."""
+    """Return an inspection mesh with edges of about `size` mm whose nodes lie on a mesh model, and remarks."""
 
     def place(body: Integers, nodes: Floats, normals: Floats, feature: Booleans) -> Placed:
         return _on_surface(Surface(surface.vertices, surface.triangles[body]), nodes, normals, feature, size)

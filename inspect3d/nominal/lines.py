@@ -9,12 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from inspect3d.arrays import Booleans, Floats, Integers, unit
+from inspect3d.nominal.brep import Brep
 from inspect3d.nominal.remeshing import FEATURE_ANGLE
 from inspect3d.nominal.sharp import corners_of_lines, sides_of
 from inspect3d.nominal.tessellation import Tessellation
 
 _GAPE = 5e-7
-_INWARD = (1e-6, 1e-5, 1e-4)
+"""A border that may gape by more than this, mm, leaves doubt who owns its nodes."""
 
 
 class Placed(NamedTuple):
@@ -34,6 +35,15 @@ class Placed(NamedTuple):
     crease: Booleans
 
 
+class _OnEdges(NamedTuple):
+    """Places on edges: their owners, the parameters there, the mean normals, and whether the faces make a crease."""
+
+    face: Integers
+    uv: Floats
+    normals: Floats
+    crease: Booleans
+
+
 @dataclass(frozen=True, eq=False)
 class Lines:
     """The pieces of the edges of a tessellated B-rep.
@@ -50,11 +60,12 @@ class Lines:
         """Return the segments where faces meet at more than 30 degrees or end."""
         mesh = self.tessellation
         segment = np.arange(len(mesh.segments))
-        middle = sum(self.ends(segment)) / 2
+        start, end = self.ends(segment)
         sides = sides_of(mesh.vertices, mesh.triangles)
         rims = sides.ends[sides.uses != 2] @ (len(mesh.vertices), 1)
         is_rim = np.isin(np.sort(mesh.segments, axis=1) @ (len(mesh.vertices), 1), rims)
-        return np.flatnonzero(is_rim | self.at_segments(segment, np.full(len(segment), 0.5), middle).crease)
+        halfway = np.full(len(segment), 0.5)
+        return np.flatnonzero(is_rim | self._on_edges(segment, halfway, (start + end) / 2).crease)
 
     @cached_property
     def corners(self) -> Integers:
@@ -79,7 +90,10 @@ class Lines:
         owner[mesh.triangles[last_first].ravel()] = corners
         triangle, corner = owner[vertex].T
         face = mesh.face[triangle]
-        points = mesh.brep.points_at(face, mesh.uv[triangle, corner])
+        uv = mesh.uv[triangle, corner]
+        points = mesh.brep.points_at(face, uv)
+        gape = np.linalg.norm(points - mesh.vertices[vertex], axis=1)
+        _own(mesh.brep, points, face, uv, gape > _GAPE)
         return Placed(points, self._vertex_normals[vertex], face, self._folded[vertex])
 
     def at_segments(self, segment: Integers, share: Floats, nodes: Floats) -> Placed:
@@ -90,18 +104,11 @@ class Lines:
         segment : (k,) near the node
         share : (k,) how far along it, to start from
         """
-        brep = self.tessellation.brep
-        edge = self.tessellation.segment_edge[segment]
-        rows = zip(edge.tolist(), self._t(segment, share).tolist(), nodes, strict=True)
-        t = np.array([_closest_on_curve(brep.curves[e], start, point) for e, start, point in rows])
-        face = np.array([brep.edge_faces[e][0] for e in edge.tolist()], dtype=np.int64)
-        last = np.array([brep.edge_faces[e][-1] for e in edge.tolist()], dtype=np.int64)
-        uv = self._uv(edge, face, t)
-        one, other = brep.normals_at(face, uv), brep.normals_at(last, self._uv(edge, last, t))
-        both = unit(one + other)
-        normals = np.where(both.any(axis=1, keepdims=True), both, one)
-        crease = (one * other).sum(axis=1) < np.cos(FEATURE_ANGLE)
-        return Placed(brep.points_at(face, self._within(edge, face, t, uv)), normals, face, crease)
+        on_edges = self._on_edges(segment, share, nodes)
+        brep, face, uv = self.tessellation.brep, on_edges.face, on_edges.uv
+        points = brep.points_at(face, uv)
+        _own(brep, points, face, uv, brep.edge_tolerance[self.tessellation.segment_edge[segment]] > _GAPE)
+        return Placed(points, on_edges.normals, face, on_edges.crease)
 
     def across(self, segment: Integers, face: Integers) -> Integers:
         """Return the number of the face on the other side of segments, (k,); at a rim the same one."""
@@ -112,6 +119,19 @@ class Lines:
     def parameters(self, segment: Integers, share: Floats, face: Integers) -> Floats:
         """Return where points of segments lie in the parameters of a face beside them, (k, 2)."""
         return self._uv(self.tessellation.segment_edge[segment], face, self._t(segment, share))
+
+    def _on_edges(self, segment: Integers, share: Floats, nodes: Floats) -> _OnEdges:
+        brep = self.tessellation.brep
+        edge = self.tessellation.segment_edge[segment]
+        rows = zip(edge.tolist(), self._t(segment, share).tolist(), nodes, strict=True)
+        t = np.array([_closest_on_curve(brep.curves[e], start, point) for e, start, point in rows])
+        face = np.array([brep.edge_faces[e][0] for e in edge.tolist()], dtype=np.int64)
+        last = np.array([brep.edge_faces[e][-1] for e in edge.tolist()], dtype=np.int64)
+        uv = self._uv(edge, face, t)
+        one, other = brep.normals_at(face, uv), brep.normals_at(last, self._uv(edge, last, t))
+        both = unit(one + other)
+        normals = np.where(both.any(axis=1, keepdims=True), both, one)
+        return _OnEdges(face, uv, normals, (one * other).sum(axis=1) < np.cos(FEATURE_ANGLE))
 
     @cached_property
     def _curves(self) -> dict[tuple[int, int], Any]:
@@ -135,7 +155,7 @@ class Lines:
 
     @cached_property
     def _folded(self) -> Booleans:
-        """Tell around which vertices the faces are more than 30 degrees apart: some one more than half of it off the mean."""
+        """Tell around which vertices (n,) faces are more than 30 degrees apart: one is half of that off their mean."""
         triangles = self.tessellation.triangles
         agreement = (self._corner_normals * self._vertex_normals[triangles]).sum(axis=2)
         least = np.ones(len(self.tessellation.vertices))
@@ -158,36 +178,11 @@ class Lines:
             self._curves[edge, face] = BRepAdaptor_Curve2d(brep.edges[edge], brep.faces[face - 1])
         return self._curves[edge, face]
 
-    def _within(self, edge: Integers, face: Integers, t: Floats, uv: Floats) -> Floats:
-        """Return parameters a hair within the face where it gapes from its edge, so that it owns the node beyond doubt."""
-        brep = self.tessellation.brep
-        on_edge = np.array([brep.curves[e].Value(at).Coord() for e, at in zip(edge.tolist(), t.tolist(), strict=True)])
-        gape = np.linalg.norm(brep.points_at(face, uv) - on_edge.reshape(-1, 3), axis=1)
-        moved = uv.copy()
-        for k in np.flatnonzero(gape > _GAPE):
-            moved[k] = self._a_hair_within(int(edge[k]), int(face[k]), float(t[k]), uv[k])
-        return moved
 
-    def _a_hair_within(self, edge: int, face: int, t: float, uv: Floats) -> Floats:
-        from OCP.BRepClass import BRepClass_FaceClassifier
-        from OCP.gp import gp_Pnt, gp_Pnt2d, gp_Vec, gp_Vec2d
-        from OCP.TopAbs import TopAbs_State
-
-        brep = self.tessellation.brep
-        at, along, point, s_u, s_v = gp_Pnt2d(), gp_Vec2d(), gp_Pnt(), gp_Vec(), gp_Vec()
-        self._curve_on(edge, face).D1(t, at, along)
-        brep.surfaces[face - 1].D1(*uv, point, s_u, s_v)
-        scale = np.array([s_u.Magnitude(), s_v.Magnitude()])
-        if not scale.all():
-            return uv
-        # In parameters stretched to mm the inward direction is square to the edge; on which side, trying tells.
-        square = unit(np.array([-along.Y() * scale[1], along.X() * scale[0]])) / scale
-        for distance in _INWARD:
-            for trial in (uv + distance * square, uv - distance * square):
-                region = BRepClass_FaceClassifier(brep.faces[face - 1], gp_Pnt2d(*trial), 1e-9)
-                if region.State() == TopAbs_State.TopAbs_IN:
-                    return trial
-        return uv
+def _own(brep: Brep, points: Floats, face: Integers, uv: Floats, doubtful: Booleans) -> None:
+    """Move the doubtful points of borders a hair into their faces, where needed."""
+    for k in np.flatnonzero(doubtful).tolist():
+        points[k] = brep.owned(int(face[k]), uv[k])
 
 
 def _closest_on_curve(curve: Any, start: float, point: Floats) -> float:

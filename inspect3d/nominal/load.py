@@ -17,6 +17,7 @@ from inspect3d.outcome import InputError
 
 _ELEMENTS_PER_DIAGONAL = 60
 _CHORD_PER_DIAGONAL = 1e-5
+_CHORDS_PER_ELEMENT = 50
 _FEW_TRIANGLES, _MOST_TRIANGLES = 60_000, 2_000_000
 _FINER = 8.0  # by which a surface of few triangles is made finer: the number grows in proportion at the most
 _MILLIMETRES = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "inch": 25.4, "ft": 304.8}
@@ -55,23 +56,16 @@ def load_nominal(
 
 def _exact(path: Path, name: str, element_size: float | None, flip: bool) -> Nominal:
     brep = read_brep(path)
-    size = element_size or _diagonal(brep) / _ELEMENTS_PER_DIAGONAL
-    rough = tessellated(brep, size / 50)
-    is_open = not Surface(rough.vertices, rough.triangles).closed
+    fine = _fine(brep)
+    is_open = not Surface(fine.vertices, fine.triangles).closed
     if flip and is_open:
         brep = brep.turned()
-        rough = tessellated(brep, size / 50)
-    mesh, remarks = mesh_on_brep(rough, size)
-    fine = _fine(brep)
+        fine = _fine(brep)
     surface = Surface(fine.vertices, fine.triangles)
+    size = element_size or surface.diagonal / _ELEMENTS_PER_DIAGONAL
+    mesh, remarks = mesh_on_brep(tessellated(brep, size / _CHORDS_PER_ELEMENT), size)
     remarks += _remarks_on(brep, fine, is_open, flip)
-    return Nominal(name, surface, mesh, fine.chord(), remarks, brep, fine.face)
-
-
-def _diagonal(brep: Brep) -> float:
-    """Return the diagonal of the bounding box to a part in a thousand, mm."""
-    mesh = tessellated(brep, 1e-3 * brep.diagonal)
-    return Surface(mesh.vertices, mesh.triangles).diagonal
+    return Nominal(name, surface, mesh, fine.chord, remarks, brep, fine.face)
 
 
 def _fine(brep: Brep) -> Tessellation:

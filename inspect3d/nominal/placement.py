@@ -59,7 +59,8 @@ def _on_faces(lines: Lines, nodes: Floats, normals: Floats, size: float) -> Plac
     reached = mesh.brep.inside(face, uv) & (np.linalg.norm(points - feet, axis=1) < size)
     over = np.flatnonzero(~reached)
     border = nearest_on_segments(feet[over], *lines.ends(slice(None)), size / 4)
-    over, segment, share = (column[border.segment >= 0] for column in (over, border.segment, border.share))
+    bounded = border.segment >= 0
+    over, segment, share = over[bounded], border.segment[bounded], border.share[bounded]
 
     other = lines.across(segment, face[over])
     beyond, beyond_uv = mesh.brep.project(feet[over], other, lines.parameters(segment, share, other))

@@ -9,7 +9,7 @@ _GAP = 1e-4
 
 
 def sewn(shape: Any, faces: list[Any], diagonal: float) -> tuple[Any, list[Any]]:
-    """Return a `TopoDS_Shape` with common edges, closed shells turned outside out, and its faces in the order of `faces`.
+    """Return a `TopoDS_Shape` with common edges, its closed shells outside out, and its faces in the order of `faces`.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ def wound(vertices: Floats, triangles: Integers, flip: bool = False) -> Wound:
 
 
 def _sheets(triangles: Integers) -> tuple[Integers, Booleans, bool, Booleans]:
-    """Return the sheet of each triangle, whether to turn it, whether neighbours then agree, and which sheets are open.
+    """Return the sheet of each triangle, whether to turn it, whether all then agree, and which sheets are open.
 
     Neighbours share a side that has no third triangle. They agree if they run along it in opposite directions.
     """
@@ -66,7 +66,7 @@ def _sheets(triangles: Integers) -> tuple[Integers, Booleans, bool, Booleans]:
     first, second = order[pair], order[pair + 1]
     one, other, agree = first // 3, second // 3, start[first] != start[second]
     sheets, sheet = connected_components(coo_array((np.ones(len(one)), (one, other)), shape=(m, m)), directed=False)
-    # Two copies of each triangle, one of them turned, joined where they agree: a sheet has two sides if they stay apart.
+    # Two copies of each triangle, one turned, joined where they agree: a sheet has two sides if they stay apart.
     a, b = np.concatenate([one, one + m]), np.concatenate([other + m * ~agree, other + m * agree])
     _, side_of = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(2 * m, 2 * m)), directed=False)
     first_of_sheet = np.unique(sheet, return_index=True)[1]
