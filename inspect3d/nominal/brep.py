@@ -13,6 +13,7 @@ from inspect3d.arrays import Booleans, Floats, Integers, floats, unit
 from inspect3d.nominal.closest_parameters import closest_parameters
 
 _OWNED = 5e-7
+_POLE = 1e-10
 _COMPASS = np.stack([np.cos(np.arange(8) * np.pi / 4), np.sin(np.arange(8) * np.pi / 4)], axis=1)
 _HAIRS = (np.zeros(2), *(length * direction for length in (1e-5, 1e-3, 2e-2) for direction in _COMPASS))
 """Steps in mm to try from a border, the shortest first."""
@@ -176,19 +177,26 @@ def _natural_normals(surface: Any, uv: Sequence[tuple[float, float]]) -> np.ndar
     for row, (u, v) in zip(rows, uv, strict=True):
         surface.D1(u, v, point, along_u, along_v)
         row[0], row[1] = along_u.Coord(), along_v.Coord()
+    lengths = np.linalg.norm(rows, axis=2)
     normals = np.cross(unit(rows[:, 0]), unit(rows[:, 1]))
-    for pole in np.flatnonzero(np.linalg.norm(normals, axis=1) < 1e-6).tolist():
+    singular = (lengths.min(axis=1) < _POLE * lengths.max(axis=1)) | (np.linalg.norm(normals, axis=1) < _POLE)
+    for pole in np.flatnonzero(singular).tolist():
         normals[pole] = _limit_normal(surface, *uv[pole])
     return unit(normals)
 
 
-def _limit_normal(surface: Any, u: float, v: float) -> tuple[float, float, float]:
-    from OCP.BRepLProp import BRepLProp_SLProps
+def _limit_normal(surface: Any, u: float, v: float) -> np.ndarray:
+    """Return the normal at a pole, where a derivative vanishes: the limit along the line that runs into it."""
+    from OCP.gp import gp_Pnt, gp_Vec
 
-    local = BRepLProp_SLProps(surface, u, v, 2, 1e-9)
-    if local.IsNormalDefined():
-        return local.Normal().Coord()
+    point, along_u, along_v = gp_Pnt(), gp_Vec(), gp_Vec()
+    surface.D1(u, v, point, along_u, along_v)
+    into_u, into_v = along_v.Magnitude() <= along_u.Magnitude(), along_u.Magnitude() <= along_v.Magnitude()
     middle_u = (surface.FirstUParameter() + surface.LastUParameter()) / 2
     middle_v = (surface.FirstVParameter() + surface.LastVParameter()) / 2
-    beside = BRepLProp_SLProps(surface, u + 1e-4 * (middle_u - u), v + 1e-4 * (middle_v - v), 2, 1e-12)
-    return beside.Normal().Coord() if beside.IsNormalDefined() else (0.0, 0.0, 0.0)
+    near = np.empty((2, 3))
+    for row, share in zip(near, (1e-4, 2e-4), strict=True):
+        surface.D1(u + into_u * share * (middle_u - u), v + into_v * share * (middle_v - v), point, along_u, along_v)
+        row[:] = along_u.Crossed(along_v).Coord()
+    near = unit(near)
+    return 2 * near[0] - near[1]

@@ -98,7 +98,7 @@ def _transferred(path: Path, is_step: bool) -> Any:
     from OCP.IGESControl import IGESControl_Reader
     from OCP.STEPControl import STEPControl_Reader
 
-    _silence()
+    silence()
     reader: Any = STEPControl_Reader() if is_step else IGESControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise InputError(f"{path.name} cannot be read as {'STEP' if is_step else 'IGES'}; export it again.")
@@ -106,7 +106,7 @@ def _transferred(path: Path, is_step: bool) -> Any:
     return reader.OneShape()
 
 
-def _silence() -> None:
+def silence() -> None:
     """Take the printers from OpenCASCADE's messenger: nothing here prints."""
     from OCP.Message import Message
 

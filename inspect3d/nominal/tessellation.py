@@ -42,17 +42,23 @@ class Tessellation:
 
     @cached_property
     def chord(self) -> float:
-        """Return the largest distance from the middle of a triangle to its exact face, mm.
+        """Return the largest distance from the middle of a triangle to its exact face, mm."""
+        return float(self._worst.max())
 
-        All triangles are looked at from the mean of their parameters; the feet of the worst are found.
-        """
-        corners = self.vertices[self.triangles]
+    def share_beyond(self, distance: float) -> float:
+        """Return the share of triangles, up to 1 %, whose middle is farther than `distance` mm from the exact face."""
+        return np.count_nonzero(self._worst > distance) / len(self.triangles)
+
+    @cached_property
+    def _worst(self) -> Floats:
+        """Return the distances to the exact faces of the triangles above which these seem to rise most."""
+        corners, guess = self.vertices[self.triangles], self.uv.mean(axis=1)
         normals = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-        middles, guess = corners.mean(axis=1), self.uv.mean(axis=1)
-        rise = np.abs(((self.brep.points_at(self.face, guess) - middles) * normals).sum(axis=1))
-        worst = np.argsort(rise)[-_WORST:]
-        feet, _ = self.brep.project(middles[worst], self.face[worst], guess[worst])
-        return float(np.linalg.norm(feet - middles[worst], axis=1).max())
+        rise = np.abs(((self.brep.points_at(self.face, guess) - corners[:, 0]) * normals).sum(axis=1))
+        worst = np.argsort(rise)[-max(_WORST, len(rise) // 100) :]
+        middles = corners[worst].mean(axis=1)
+        feet, _ = self.brep.project(middles, self.face[worst], guess[worst])
+        return np.linalg.norm(feet - middles, axis=1)
 
 
 def tessellated(brep: Brep, deflection: float, angle: float = 0.3) -> Tessellation:
@@ -68,13 +74,17 @@ def tessellated(brep: Brep, deflection: float, angle: float = 0.3) -> Tessellati
     """
     # Delabella is several times quicker and makes fewer folds; where it fails, the other algorithm usually does not.
     quick = _joined(brep, deflection, angle, "Delabella")
-    allowed = 3 * deflection + brep.edge_tolerance.max(initial=0.0)
-    if quick is not None and len(np.unique(quick.face)) == len(brep.faces) and quick.chord < allowed:
+    allowed = 2 * deflection + brep.edge_tolerance.max(initial=0.0)
+    if quick is not None and _faces(quick) == len(brep.faces) and quick.share_beyond(allowed) < 0.001:
         return quick
     tried = [mesh for mesh in (quick, _joined(brep, deflection, angle, "Watson")) if mesh is not None]
     if not tried:
         raise InputError("None of the model's faces can be triangulated; export it again from the CAD system.")
-    return max(tried, key=lambda mesh: (len(np.unique(mesh.face)), -mesh.chord))
+    return max(tried, key=lambda mesh: (_faces(mesh), -mesh.chord))
+
+
+def _faces(mesh: Tessellation) -> int:
+    return len(np.unique(mesh.face))
 
 
 def _joined(brep: Brep, deflection: float, angle: float, algorithm: str) -> Tessellation | None:
@@ -131,7 +141,7 @@ class _Join:
         points = [mesh.Node(k).Transformed(motion).Coord() for k in local]
         uv = np.array([mesh.UVNode(k).Coord() for k in local])
         index = np.full(len(points), -1)
-        self._join_edges(face, mesh, location, points, index)
+        poles = self._join_edges(face, mesh, location, points, index)
         for k in np.flatnonzero(index < 0):
             index[k] = self._new(points[k])
         corners = np.array([mesh.Triangle(k).Get() for k in range(1, mesh.NbTriangles() + 1)]) - 1
@@ -139,7 +149,7 @@ class _Join:
             corners = corners[:, ::-1]
         triangles = index[corners]
         whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
-        self.triangles.append((triangles[whole], np.full(whole.sum(), number), uv[corners[whole]]))
+        self.triangles.append((triangles[whole], np.full(whole.sum(), number), _at_poles(corners, uv, poles)[whole]))
 
     def tessellation(self) -> Tessellation:
         empty = (np.empty((0, 2), dtype=np.int64), np.empty(0, dtype=np.int64), np.empty((0, 2)))
@@ -151,13 +161,15 @@ class _Join:
         self.points.append(point)
         return len(self.points) - 1
 
-    def _join_edges(self, face: Any, mesh: Any, location: Any, points: list, index: Integers) -> None:
-        """Give the nodes along the edges of a face the index they have in the neighbouring face."""
+    def _join_edges(self, face: Any, mesh: Any, location: Any, points: list, index: Integers) -> list[tuple]:
+        """Give nodes along the edges of a face the index they have in the next one; return what `_at_poles` needs."""
         from OCP.BRep import BRep_Tool
+        from OCP.BRepAdaptor import BRepAdaptor_Curve2d
         from OCP.TopAbs import TopAbs_ShapeEnum
         from OCP.TopExp import TopExp, TopExp_Explorer
         from OCP.TopoDS import TopoDS
 
+        poles = []
         explorer = TopExp_Explorer(face, TopAbs_ShapeEnum.TopAbs_EDGE)
         while explorer.More():
             edge = TopoDS.Edge_s(explorer.Current())
@@ -170,6 +182,9 @@ class _Join:
             last = self._corner(TopExp.LastVertex_s(edge), points[nodes[-1]])
             if BRep_Tool.Degenerated_s(edge):
                 index[nodes] = first
+                along = BRepAdaptor_Curve2d(edge, face)
+                start, end = (np.array(along.Value(t()).Coord()) for t in (along.FirstParameter, along.LastParameter))
+                poles.append((nodes, int(np.abs(end - start).argmax())))
                 continue
             which = self.edge_map.FindIndex(edge) - 1
             if (which, len(nodes)) not in self.along:
@@ -179,6 +194,7 @@ class _Join:
                 self.segments.append((pieces, np.full(len(pieces), which), np.stack([t[:-1], t[1:]], axis=1)))
                 self.along[which, len(nodes)] = vertices
             index[nodes] = self.along[which, len(nodes)]
+        return poles
 
     def _corner(self, vertex: Any, point: tuple[float, float, float]) -> int:
         which = self.vertex_map.FindIndex(vertex)
@@ -187,3 +203,21 @@ class _Join:
         if which not in self.corners:
             self.corners[which] = self._new(point)
         return self.corners[which]
+
+
+def _at_poles(corners: Integers, uv: Floats, poles: list[tuple[list[int], int]]) -> Floats:
+    """Return the parameters of the corners (m, 3, 2); at a pole the one that it leaves open is that of the triangle.
+
+    Parameters
+    ----------
+    corners : (m, 3) nodes of the triangles
+    uv : (n, 2) of the nodes
+    poles : nodes at a pole, and which parameter runs round it
+    """
+    at = uv[corners]
+    for nodes, axis in poles:
+        pole = np.isin(corners, nodes)
+        single = pole.sum(axis=1) == 1
+        others = np.where(pole, 0.0, at[:, :, axis]).sum(axis=1) / 2
+        at[:, :, axis] = np.where(pole & single[:, None], others[:, None], at[:, :, axis])
+    return at
