@@ -81,7 +81,7 @@ class Camera:
             The lens folds the picture there, so that a pixel has no line of sight or several.
         """
         pixels = floats(pixels, "pixels", None, 2)
-        wanted = np.linalg.solve(self.matrix[:2, :2], (pixels - self.matrix[:2, 2]).T).T
+        wanted = floats(np.linalg.solve(self.matrix[:2, :2], (pixels - self.matrix[:2, 2]).T).T, "places", None, 2)
         found = wanted.copy()
         for _ in range(STEPS):
             distorted, slope = _distorted(found, self.distortion)
@@ -127,7 +127,7 @@ class View:
 
 
 def _distorted(ideal: Floats, distortion: Floats) -> tuple[Floats, Floats]:
-    """Return distorted places (n, 2) of ideal ones (n, 2), on z = 1, and the derivative (n, 2, 2) of the one by the other."""
+    """Return the distorted places (n, 2) of ideal ones (n, 2), all on z = 1, and the derivatives (n, 2, 2)."""
     k1, k2, p1, p2, k3 = distortion
     x, y = ideal.T
     squared = x * x + y * y
