@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+import warnings
 from ctypes import CDLL, RTLD_GLOBAL
 from importlib import import_module
 from types import ModuleType
@@ -50,6 +51,7 @@ def import_open3d() -> ModuleType:
     libusb = imported("libusb_package").get_library_path()
     if libusb is not None:
         CDLL(str(libusb), mode=RTLD_GLOBAL)
+    warnings.filterwarnings("ignore", "The TBB threading layer requires")  # numba does without the TBB Open3D brings
     open3d = imported("open3d")
     open3d.utility.set_verbosity_level(open3d.utility.VerbosityLevel.Error)
     return open3d

@@ -16,6 +16,7 @@ from shutil import copy, copytree, ignore_patterns
 import pytest
 
 from inspect3d.doctor import MODULES
+from inspect3d.inspection import LIBRARIES
 from inspect3d.recipe import load_recipe
 
 ROOT = Path(__file__).parents[1]
@@ -151,9 +152,6 @@ BY_NAME = {"open3d", "libusb-package"}
 AHEAD = {"opencv-python-headless", "pycolmap"}
 """Packages of the stereo methods, which are on their way."""
 
-SILENT = {"networkx"}
-"""Packages that others use where they are installed."""
-
 
 def imported_packages(path: Path) -> set[str]:
     """Return the packages a module imports anywhere, by the names pip knows them under."""
@@ -167,5 +165,7 @@ def imported_packages(path: Path) -> set[str]:
 
 def test_every_package_that_is_imported_is_declared_and_the_other_way_round():
     modules = [*(ROOT / "inspect3d").rglob("*.py"), *(ROOT / "plugins").rglob("*.py")]
-    used = set().union(*map(imported_packages, modules)) - {"pydantic-core"} | BY_NAME | AHEAD | SILENT
-    assert used == {re.split(r"[^\w-]", line, maxsplit=1)[0] for line in PROJECT["project"]["dependencies"]}
+    declared = {re.split(r"[^\w-]", line, maxsplit=1)[0] for line in PROJECT["project"]["dependencies"]}
+    used = set().union(*map(imported_packages, modules)) - {"pydantic-core"} | BY_NAME | AHEAD
+    assert used == declared
+    assert set(LIBRARIES) <= declared

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import config, njit
 from numpy.typing import NDArray
 
 from inspect3d.arrays import Floats, Integers
+
+vars(config)["THREADING_LAYER_PRIORITY"] = ["omp", "tbb", "workqueue"]  # else numba warns about the TBB Open3D loads
 
 LANES = 8
 BRANCH, LEAF = 0, 1
@@ -66,7 +68,7 @@ def build(corners: Floats, normals: Floats) -> Tree:
 
 
 @njit(cache=True)
-def _build(lower, upper):
+def _build(lower: Floats, upper: Floats) -> tuple[Floats, NDArray[np.int32], Integers, Integers]:
     m = len(lower)
     boxes = np.empty((2 * m, 6))
     links = np.empty((2 * m, 2), dtype=np.int32)
@@ -79,7 +81,7 @@ def _build(lower, upper):
     while waiting > 0:
         waiting -= 1
         node, start, stop, depth = tasks[waiting]
-        _enclose(lower, upper, order, start, stop, boxes[node])
+        _enclose(lower, upper, order[start:stop], boxes[node])
         if stop - start <= LANES:
             links[node] = (LEAF, leaves)
             first[leaves] = start
@@ -95,15 +97,15 @@ def _build(lower, upper):
 
 
 @njit(cache=True)
-def _enclose(lower, upper, order, start, stop, box):
+def _enclose(lower: Floats, upper: Floats, members: Integers, box: Floats) -> None:
     box[:3] = np.inf
     box[3:] = -np.inf
-    for k in order[start:stop]:
+    for k in members:
         _widen(box, lower[k], upper[k])
 
 
 @njit(cache=True)
-def _split(lower, upper, centres, order, start, stop, depth):
+def _split(lower: Floats, upper: Floats, centres: Floats, order: Integers, start: int, stop: int, depth: int) -> int:
     """Reorder order[start:stop] and return where its second part begins."""
     axis, low, extent = 0, 0.0, -1.0
     for candidate in range(3):
@@ -144,7 +146,7 @@ def _split(lower, upper, centres, order, start, stop, depth):
 
 
 @njit(cache=True)
-def _cheapest_cut(counts, bounds):
+def _cheapest_cut(counts: Integers, bounds: Floats) -> int:
     """Return the last bin of the first part where area times count, summed over both parts, is least."""
     above = np.zeros(BINS)
     box = bounds[BINS - 1].copy()
@@ -165,13 +167,13 @@ def _cheapest_cut(counts, bounds):
 
 
 @njit(cache=True)
-def _widen(box, lower, upper):
+def _widen(box: Floats, lower: Floats, upper: Floats) -> None:
     for axis in range(3):
         box[axis] = min(box[axis], lower[axis])
         box[3 + axis] = max(box[3 + axis], upper[axis])
 
 
 @njit(cache=True)
-def _area(box):
+def _area(box: Floats) -> float:
     x, y, z = box[3] - box[0], box[4] - box[1], box[5] - box[2]
     return x * y + y * z + z * x

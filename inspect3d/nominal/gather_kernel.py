@@ -11,11 +11,13 @@ import math
 import numpy as np
 from numba import njit
 
-from inspect3d.nominal.bvh import BRANCH, LANES, STACK
+from inspect3d.arrays import Booleans, Floats
+from inspect3d.nominal.bvh import BRANCH, LANES, STACK, Tree
+from inspect3d.nominal.features import Features
 
 
 @njit(cache=True)
-def gathered_normal(x, y, z, tree, features):
+def gathered_normal(x: float, y: float, z: float, tree: Tree, features: Features) -> tuple[float, float, float, bool]:
     """Return the unit normal at a point of the surface, zero where it cancels, and whether an open rim passes there.
 
     Each triangle that touches the point counts by the angle it takes up around it: a full turn where the point lies in
@@ -57,7 +59,7 @@ def gathered_normal(x, y, z, tree, features):
 
 
 @njit(cache=True)
-def _within(point, box, tolerance):
+def _within(point: Floats, box: Floats, tolerance: float) -> bool:
     for axis in range(3):
         if point[axis] < box[axis] - tolerance or point[axis] > box[3 + axis] + tolerance:
             return False
@@ -65,7 +67,7 @@ def _within(point, box, tolerance):
 
 
 @njit(cache=True)
-def _touches(point, record, tolerance, near):
+def _touches(point: Floats, record: Floats, tolerance: float, near: Booleans) -> bool:
     """Tell whether a point lies on a triangle; write which of its edges ab, bc, ca it is near to."""
     normal = record[9:12]
     inside = normal.any() and abs(_dot(point - record[:3], normal)) <= tolerance
@@ -76,11 +78,11 @@ def _touches(point, record, tolerance, near):
         apart = arm - along * edge
         near[k] = _dot(apart, apart) <= tolerance**2
         inside = inside and _dot(np.cross(edge, arm), normal) > 0
-    return inside or near.any()
+    return inside or bool(near.any())
 
 
 @njit(cache=True)
-def _angle(record, near):
+def _angle(record: Floats, near: Booleans) -> float:
     """Return the angle a triangle takes up around a point on it that is near to the given edges."""
     count = int(near[0]) + int(near[1]) + int(near[2])
     if count == 3:
@@ -97,5 +99,5 @@ def _angle(record, near):
 
 
 @njit(cache=True)
-def _dot(u, v):
+def _dot(u: Floats, v: Floats) -> float:
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]

@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from inspect3d.nominal.bvh import BRANCH, LANES, STACK
+from inspect3d.arrays import Floats, Integers
+from inspect3d.nominal.bvh import BRANCH, LANES, STACK, Tree
 
 BATCH = 512
 
 
 @njit(cache=True, parallel=True)
-def first_hit(origins, directions, reaches, tree, distance, triangle):
+def first_hit(
+    origins: Floats, directions: Floats, reaches: Floats, tree: Tree, distance: Floats, triangle: Integers
+) -> None:
     """Write how far along its direction each ray first meets a triangle, and which.
 
     Parameters
@@ -34,7 +37,7 @@ def first_hit(origins, directions, reaches, tree, distance, triangle):
 
 
 @njit(cache=True)
-def _first(ray, reach, tree, stack, lengths):
+def _first(ray: Floats, reach: float, tree: Tree, stack: Integers, lengths: Floats) -> tuple[float, int]:
     """Return length and triangle of the first hit of a ray: its origin, direction, and one over that."""
     links = tree.links
     least, triangle = reach, -1
@@ -62,7 +65,7 @@ def _first(ray, reach, tree, stack, lengths):
 
 
 @njit(cache=True)
-def _entry(ray, boxes, node):
+def _entry(ray: Floats, boxes: Floats, node: int) -> float:
     """Return how far along a ray a box begins, infinity where it is missed."""
     enter, leave = 0.0, np.inf
     for axis in range(3):
@@ -73,7 +76,7 @@ def _entry(ray, boxes, node):
 
 
 @njit(cache=True)
-def _write_lengths(ray, packet, lanes, lengths):
+def _write_lengths(ray: Floats, packet: Floats, lanes: int, lengths: Floats) -> None:
     """Write how far along a ray the triangles of a packet are met, infinity where they are missed, all lanes at once.
 
     Notes

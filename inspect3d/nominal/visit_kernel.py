@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
+from numpy.typing import NDArray
+
+from inspect3d.arrays import Floats, Integers
 
 CELLS = 256
 DIGIT = 4096
 
 
 @njit(cache=True)
-def visiting_order(points, origin, size):
+def visiting_order(points: Floats, origin: Floats, size: float) -> Integers:
     """Return the numbers of points (n, 3) along a curve that keeps neighbours together.
 
     The curve runs through 256^3 cells of a cube of one and a half times `size` about the origin; points outside count
@@ -27,7 +30,7 @@ def visiting_order(points, origin, size):
 
 
 @njit(cache=True, parallel=True)
-def _keys(points, origin, scale):
+def _keys(points: Floats, origin: Floats, scale: float) -> NDArray[np.int32]:
     keys = np.empty(len(points), dtype=np.int32)
     for i in prange(len(points)):
         key = 0
@@ -43,7 +46,7 @@ def _keys(points, origin, scale):
 
 
 @njit(cache=True)
-def _sorted_by(digits, order):
+def _sorted_by(digits: NDArray[np.int32], order: Integers) -> Integers:
     """Return the numbers in `order` sorted by their digits, equal ones as they were."""
     place = np.zeros(DIGIT + 1, dtype=np.int64)
     for digit in digits:

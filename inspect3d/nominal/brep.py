@@ -1,0 +1,237 @@
+"""The exact part: the trimmed faces and edges of a boundary representation (STEP, IGES)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from inspect3d.arrays import Floats, Integers, floats, unit
+
+_STEPS = 30
+"""Newton steps at most; three are usual from the guess of a fine tessellation."""
+
+
+@dataclass(frozen=True, eq=False)
+class Brep:
+    """Exact faces and edges in mm, as OpenCASCADE holds them.
+
+    Faces and edges are numbered in the order of the file (`TopExp::MapShapes`): faces from 1, as a recipe names them, edges from 0.
+
+    Parameters
+    ----------
+    shape : `TopoDS_Shape` that holds everything
+    faces : `TopoDS_Face`, number 1 first
+    edges : `TopoDS_Edge`
+    edge_faces : for each edge the numbers of the faces it bounds; one at a rim or a seam
+    edge_tolerance : (number of edges,) mm, how far faces may gape along an edge by the model's own word
+    """
+
+    shape: Any
+    faces: tuple[Any, ...]
+    edges: tuple[Any, ...]
+    edge_faces: tuple[tuple[int, ...], ...]
+    edge_tolerance: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "edge_tolerance", floats(self.edge_tolerance, "edge_tolerance", len(self.edges)))
+
+    @cached_property
+    def surfaces(self) -> tuple[Any, ...]:
+        """Return a `BRepAdaptor_Surface` for each face."""
+        from OCP.BRepAdaptor import BRepAdaptor_Surface
+
+        return tuple(BRepAdaptor_Surface(face) for face in self.faces)
+
+    @cached_property
+    def curves(self) -> tuple[Any | None, ...]:
+        """Return a `BRepAdaptor_Curve` for each edge; None where the edge is a point (the pole of a sphere)."""
+        from OCP.BRep import BRep_Tool
+        from OCP.BRepAdaptor import BRepAdaptor_Curve
+
+        return tuple(None if BRep_Tool.Degenerated_s(edge) else BRepAdaptor_Curve(edge) for edge in self.edges)
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Return the diagonal of a box that holds the part, mm; up to a few percent too long."""
+        from OCP.Bnd import Bnd_Box
+        from OCP.BRepBndLib import BRepBndLib
+
+        box = Bnd_Box()
+        BRepBndLib.Add_s(self.shape, box, False)
+        return box.CornerMin().Distance(box.CornerMax())
+
+    def points_at(self, face: Integers, uv: Floats) -> Floats:
+        """Return the points (n, 3) mm at the parameters uv (n, 2) of the faces numbered `face` (n,)."""
+        return self._by_face(face, uv, _points)
+
+    def normals_at(self, face: Integers, uv: Floats) -> Floats:
+        """Return the unit normals (n, 3), out of the material, at the parameters uv (n, 2) of the faces `face` (n,)."""
+        from OCP.TopAbs import TopAbs_Orientation
+
+        reversed_face = np.array([f.Orientation() == TopAbs_Orientation.TopAbs_REVERSED for f in self.faces])
+        normals = self._by_face(face, uv, _natural_normals)
+        return np.where(reversed_face[face - 1, None], -normals, normals)
+
+    def project(self, points: Floats, face: Integers, guess: Floats | None = None) -> tuple[Floats, Floats]:
+        """Return the closest points of given faces, disregarding their trimming, and their parameters.
+
+        Newton's method on the squared distance from a guess, with Gauss-Newton where the full Hessian is not positive definite
+        (beyond a centre of curvature).
+
+        Parameters
+        ----------
+        points : (n, 3) mm
+        face : (n,) number of the face for each point
+        guess : (n, 2) parameters to start from; found by a global search, slowly, where there is none
+
+        Returns
+        -------
+        feet (n, 3) mm, exactly on the surface of the face, and their parameters (n, 2)
+        """
+        if guess is None:
+            guess = self._search(points, face)
+        uv = np.array(guess, dtype=float)
+        for number, members in _groups(face):
+            uv[members] = _closest_parameters(self.surfaces[number - 1], points[members], uv[members])
+        return self.points_at(face, uv), uv
+
+    def inside(self, face: Integers, uv: Floats) -> np.ndarray:
+        """Tell which parameters (n, 2) lie within the trimmed region of their face, its border included."""
+        from OCP.BRepTopAdaptor import BRepTopAdaptor_FClass2d
+        from OCP.gp import gp_Pnt2d
+        from OCP.TopAbs import TopAbs_State
+
+        within = np.zeros(len(uv), dtype=bool)
+        for number, members in _groups(face):
+            region = BRepTopAdaptor_FClass2d(self.faces[number - 1], 1e-9)
+            states = [region.Perform(gp_Pnt2d(u, v)) for u, v in uv[members].tolist()]
+            within[members] = [state != TopAbs_State.TopAbs_OUT for state in states]
+        return within
+
+    def _by_face(self, face: Integers, uv: Floats, evaluate: Callable[[Any, list], np.ndarray]) -> Floats:
+        values = np.empty((len(uv), 3))
+        for number, members in _groups(face):
+            values[members] = evaluate(self.surfaces[number - 1], uv[members].tolist())
+        return values
+
+    def _search(self, points: Floats, face: Integers) -> Floats:
+        from OCP.BRep import BRep_Tool
+        from OCP.gp import gp_Pnt
+        from OCP.ShapeAnalysis import ShapeAnalysis_Surface
+
+        uv = np.empty((len(points), 2))
+        for number, members in _groups(face):
+            surface = ShapeAnalysis_Surface(BRep_Tool.Surface_s(self.faces[number - 1]))
+            uv[members] = [surface.ValueOfUV(gp_Pnt(*point), 1e-9).Coord() for point in points[members].tolist()]
+        return uv
+
+
+def _groups(labels: Integers) -> list[tuple[int, Integers]]:
+    order = np.argsort(labels, kind="stable")
+    values, starts = np.unique(labels[order], return_index=True)
+    return list(zip(values.tolist(), np.split(order, starts[1:]), strict=True)) if len(order) else []
+
+
+def _points(surface: Any, uv: Sequence[tuple[float, float]]) -> np.ndarray:
+    return np.array([surface.Value(u, v).Coord() for u, v in uv])
+
+
+def _natural_normals(surface: Any, uv: Sequence[tuple[float, float]]) -> np.ndarray:
+    """Return S_u x S_v at length one; at a pole its limit."""
+    from OCP.gp import gp_Pnt, gp_Vec
+
+    point, along_u, along_v = gp_Pnt(), gp_Vec(), gp_Vec()
+    rows = np.empty((len(uv), 2, 3))
+    for row, (u, v) in zip(rows, uv, strict=True):
+        surface.D1(u, v, point, along_u, along_v)
+        row[0], row[1] = along_u.Coord(), along_v.Coord()
+    normals = np.cross(unit(rows[:, 0]), unit(rows[:, 1]))
+    for pole in np.flatnonzero(np.linalg.norm(normals, axis=1) < 1e-6):
+        normals[pole] = _limit_normal(surface, *uv[pole])
+    return unit(normals)
+
+
+def _limit_normal(surface: Any, u: float, v: float) -> tuple[float, float, float]:
+    from OCP.BRepLProp import BRepLProp_SLProps
+
+    local = BRepLProp_SLProps(surface, u, v, 2, 1e-9)
+    if local.IsNormalDefined():
+        return local.Normal().Coord()
+    middle_u = (surface.FirstUParameter() + surface.LastUParameter()) / 2
+    middle_v = (surface.FirstVParameter() + surface.LastVParameter()) / 2
+    beside = BRepLProp_SLProps(surface, u + 1e-4 * (middle_u - u), v + 1e-4 * (middle_v - v), 2, 1e-12)
+    return beside.Normal().Coord() if beside.IsNormalDefined() else (0.0, 0.0, 0.0)
+
+
+def _closest_parameters(surface: Any, points: Floats, guess: Floats) -> Floats:
+    """Minimise |S(u, v) - p| from the guess, for all points of one face at once; no step may lead away from the point."""
+    low, high = _bounds(surface)
+    longest = 0.1 * np.array([_span(surface, "U"), _span(surface, "V")])
+    best, uv = guess.copy(), guess.copy()
+    nearest = np.full(len(points), np.inf)
+    active = np.arange(len(points))
+    for _ in range(_STEPS):
+        at, s_u, s_v, s_uu, s_vv, s_uv = _second_order(surface, uv[active])
+        r = at - points[active]
+        distance = np.linalg.norm(r, axis=1)
+        closer = distance < nearest[active]
+        nearest[active] = np.where(closer, distance, nearest[active])
+        best[active] = np.where(closer[:, None], uv[active], best[active])
+        gradient = np.stack([_dot(r, s_u), _dot(r, s_v)], axis=1)
+        e, f, g = _dot(s_u, s_u), _dot(s_u, s_v), _dot(s_v, s_v)
+        a, b, c = e + _dot(r, s_uu), f + _dot(r, s_uv), g + _dot(r, s_vv)
+        convex = (a > 0) & (a * c - b * b > 1e-12 * e * g)
+        a, b, c = (np.where(convex, full, gauss) for full, gauss in ((a, e), (b, f), (c, g)))
+        step = np.clip(-_solved(a, b, c, gradient), -longest, longest)
+        halfway = (uv[active] + best[active]) / 2
+        moved = np.where(closer[:, None], np.clip(uv[active] + step, low, high), halfway)
+        change = np.abs(moved - best[active])
+        uv[active] = moved
+        active = active[np.sqrt(e) * change[:, 0] + np.sqrt(g) * change[:, 1] > 1e-10]
+        if not len(active):
+            break
+    return best
+
+
+def _span(surface: Any, letter: str) -> float:
+    first, last = (getattr(surface, f"{end}{letter}Parameter")() for end in ("First", "Last"))
+    return min(last - first, 1e6)
+
+
+def _bounds(surface: Any) -> tuple[Floats, Floats]:
+    """Return the limits of the parameters, open where the surface closes on itself."""
+    low = np.array([surface.FirstUParameter(), surface.FirstVParameter()])
+    high = np.array([surface.LastUParameter(), surface.LastVParameter()])
+    free = np.array([surface.IsUPeriodic(), surface.IsVPeriodic()])
+    return np.where(free, -np.inf, low), np.where(free, np.inf, high)
+
+
+def _second_order(surface: Any, uv: Floats) -> Floats:
+    from OCP.gp import gp_Pnt, gp_Vec
+
+    point = gp_Pnt()
+    s_u, s_v, s_uu, s_vv, s_uv = (gp_Vec() for _ in range(5))
+    rows = np.empty((len(uv), 18))
+    for row, (u, v) in zip(rows, uv.tolist(), strict=True):
+        surface.D2(u, v, point, s_u, s_v, s_uu, s_vv, s_uv)
+        row[:] = point.Coord() + s_u.Coord() + s_v.Coord() + s_uu.Coord() + s_vv.Coord() + s_uv.Coord()
+    return np.moveaxis(rows.reshape(-1, 6, 3), 1, 0)
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.einsum("ij,ij->i", a, b)
+
+
+def _solved(a: Floats, b: Floats, c: Floats, right: Floats) -> Floats:
+    """Solve [[a, b], [b, c]] x = right; where that is singular (a pole), each unknown by itself."""
+    determinant = a * c - b * b
+    regular = determinant > 1e-14 * a * c
+    safe = np.where(regular, determinant, 1.0)
+    both = np.stack([c * right[:, 0] - b * right[:, 1], a * right[:, 1] - b * right[:, 0]], axis=1) / safe[:, None]
+    diagonal = np.stack([a, c], axis=1)
+    single = np.where(diagonal > 0, right / np.where(diagonal > 0, diagonal, 1.0), 0.0)
+    return np.where(regular[:, None], both, single)

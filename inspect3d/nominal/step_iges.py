@@ -1,0 +1,136 @@
+"""Read STEP and IGES files through OpenCASCADE."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from inspect3d.nominal.brep import Brep
+from inspect3d.outcome import InputError
+
+STEP_SUFFIXES = frozenset({".step", ".stp"})
+IGES_SUFFIXES = frozenset({".iges", ".igs"})
+
+
+def read_brep(path: Path) -> Brep:
+    """Return the faces of a STEP or IGES file in mm; the unit is the file's own.
+
+    Assemblies come with every part in its place. The faces of an IGES file, which know nothing of each other, are sewn where they meet.
+
+    Raises
+    ------
+    InputError
+        The file is not what its name says, is cut off, or holds no faces.
+    """
+    is_step = path.suffix.lower() in STEP_SUFFIXES
+    if is_step:
+        _require_step(path)
+    else:
+        _require_iges(path)
+    shape = _transferred(path, is_step)
+    if shape.IsNull() or not _mapped(shape, "face"):
+        raise InputError(
+            f"{path.name} holds no faces (perhaps only curves or points); export the part as a solid or as surfaces."
+        )
+    return brep_of(shape if is_step else _sewn(shape))
+
+
+def brep_of(shape: Any) -> Brep:
+    """Return the faces and edges of a `TopoDS_Shape` in mm, numbered in its order."""
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp
+    from OCP.TopoDS import TopoDS
+    from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape, TopTools_IndexedMapOfShape
+
+    faces_of_edge = TopTools_IndexedDataMapOfShapeListOfShape()
+    TopExp.MapShapesAndUniqueAncestors_s(
+        shape, TopAbs_ShapeEnum.TopAbs_EDGE, TopAbs_ShapeEnum.TopAbs_FACE, faces_of_edge
+    )
+    numbers = TopTools_IndexedMapOfShape()
+    TopExp.MapShapes_s(shape, TopAbs_ShapeEnum.TopAbs_FACE, numbers)
+    edges = [TopoDS.Edge_s(edge) for edge in _mapped(shape, "edge")]
+    beside = [
+        tuple(sorted(numbers.FindIndex(face) for face in faces_of_edge.FindFromKey(edge)))
+        if faces_of_edge.Contains(edge)
+        else ()
+        for edge in edges
+    ]
+    return Brep(
+        shape=shape,
+        faces=tuple(TopoDS.Face_s(face) for face in _mapped(shape, "face")),
+        edges=tuple(edges),
+        edge_faces=tuple(beside),
+        edge_tolerance=np.array([BRep_Tool.Tolerance_s(edge) for edge in edges]),
+    )
+
+
+def _mapped(shape: Any, kind: str) -> list[Any]:
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp
+    from OCP.TopTools import TopTools_IndexedMapOfShape
+
+    members = TopTools_IndexedMapOfShape()
+    TopExp.MapShapes_s(shape, getattr(TopAbs_ShapeEnum, f"TopAbs_{kind.upper()}"), members)
+    return [members.FindKey(k) for k in range(1, members.Extent() + 1)]
+
+
+def _require_step(path: Path) -> None:
+    text = path.read_bytes()
+    if b"ISO-10303-21" not in text[:1024]:
+        raise InputError(f"{path.name} is not a STEP file: it does not begin with ISO-10303-21.")
+    if b"END-ISO-10303-21" not in text[-1024:] or b"ENDSEC" not in text:
+        raise InputError(
+            f"{path.name} is cut off: its closing line END-ISO-10303-21 is missing; export or copy it again."
+        )
+
+
+def _require_iges(path: Path) -> None:
+    """Check the five sections: column 73 of every 80-column line names its section, the last line counts their lines."""
+    lines = [line for line in path.read_bytes().splitlines() if line.strip()]
+    sections = "".join(chr(line[72]) if len(line) > 72 else "?" for line in lines)
+    if not sections.startswith("S") or "G" not in sections[:100]:
+        raise InputError(f"{path.name} is not an IGES file in the fixed 80-column form.")
+    counts = lines[-1].decode("ascii", "replace")
+    announced = {counts[k]: counts[k + 1 : k + 8].strip() for k in range(0, 32, 8)} if sections.endswith("T") else {}
+    if any(announced.get(letter) != str(sections.count(letter)) for letter in "SGDP"):
+        raise InputError(
+            f"{path.name} is cut off or damaged: its last line does not count its lines; export or copy it again."
+        )
+
+
+def _transferred(path: Path, is_step: bool) -> Any:
+    from OCP.IFSelect import IFSelect_ReturnStatus
+    from OCP.IGESControl import IGESControl_Reader
+    from OCP.STEPControl import STEPControl_Reader
+
+    _silence()
+    reader: Any = STEPControl_Reader() if is_step else IGESControl_Reader()
+    if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
+        raise InputError(f"{path.name} cannot be read as {'STEP' if is_step else 'IGES'}; export it again.")
+    reader.TransferRoots()
+    return reader.OneShape()
+
+
+def _silence() -> None:
+    """Take the printers from OpenCASCADE's messenger: nothing here prints."""
+    from OCP.Message import Message
+
+    messenger = Message.DefaultMessenger_s()
+    for printer in list(messenger.Printers()):
+        messenger.RemovePrinter(printer)
+
+
+def _sewn(shape: Any) -> Any:
+    from OCP.Bnd import Bnd_Box
+    from OCP.BRepBndLib import BRepBndLib
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
+
+    box = Bnd_Box()
+    BRepBndLib.Add_s(shape, box)
+    sewing = BRepBuilderAPI_Sewing(max(1e-6, 1e-5 * box.CornerMin().Distance(box.CornerMax())))
+    sewing.Load(shape)
+    sewing.Perform()
+    return sewing.SewedShape()

@@ -1,0 +1,146 @@
+"""Triangles on the faces of a B-rep, joined along its edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from inspect3d.arrays import Floats, Integers
+from inspect3d.nominal.brep import Brep
+
+
+@dataclass(frozen=True, eq=False)
+class Tessellation:
+    """Triangles whose corners lie on exact faces and know where.
+
+    Parameters
+    ----------
+    brep : the exact part
+    vertices : (n, 3) mm, one for all triangles around it, across faces
+    triangles : (m, 3) indices, counter-clockwise seen from outside
+    face : (m,) number of the face
+    uv : (m, 3, 2) parameters of the corners on that face
+    segments : (k, 2) vertices, the pieces of the edges, each edge once
+    segment_edge : (k,) index of the edge
+    segment_t : (k, 2) parameters of the edge at both ends of the piece
+    """
+
+    brep: Brep
+    vertices: Floats
+    triangles: Integers
+    face: Integers
+    uv: Floats
+    segments: Integers
+    segment_edge: Integers
+    segment_t: Floats
+
+
+def tessellated(brep: Brep, deflection: float, angle: float = 0.2) -> Tessellation:
+    """Triangulate the faces with chords below `deflection` mm and turns below `angle` rad, and join them along their edges.
+
+    Faces that meet in an edge share its discretisation, so that the triangles close where the model closes.
+    """
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.BRepTools import BRepTools
+
+    BRepTools.Clean_s(brep.shape)
+    BRepMesh_IncrementalMesh(brep.shape, deflection, False, angle, True)
+    joined = _Join(brep)
+    for number in range(1, len(brep.faces) + 1):
+        joined.add(number)
+    BRepTools.Clean_s(brep.shape)
+    return joined.tessellation()
+
+
+class _Join:
+    """Gathers the triangulations of the faces and gives common vertices one index."""
+
+    def __init__(self, brep: Brep) -> None:
+        from OCP.TopAbs import TopAbs_ShapeEnum
+        from OCP.TopExp import TopExp
+        from OCP.TopTools import TopTools_IndexedMapOfShape
+
+        self.brep = brep
+        self.edge_map = TopTools_IndexedMapOfShape()
+        self.vertex_map = TopTools_IndexedMapOfShape()
+        TopExp.MapShapes_s(brep.shape, TopAbs_ShapeEnum.TopAbs_EDGE, self.edge_map)
+        TopExp.MapShapes_s(brep.shape, TopAbs_ShapeEnum.TopAbs_VERTEX, self.vertex_map)
+        self.along: dict[tuple[int, int], list[int]] = {}
+        self.corners: dict[int, int] = {}
+        self.points: list[tuple[float, float, float]] = []
+        self.triangles: list[tuple[Integers, Integers, Floats]] = []
+        self.segments: list[tuple[Integers, Integers, Floats]] = []
+
+    def add(self, number: int) -> None:
+        from OCP.BRep import BRep_Tool
+        from OCP.TopAbs import TopAbs_Orientation
+        from OCP.TopLoc import TopLoc_Location
+
+        face = self.brep.faces[number - 1]
+        location = TopLoc_Location()
+        mesh = BRep_Tool.Triangulation_s(face, location)
+        if mesh is None or mesh.NbTriangles() == 0:
+            return
+        motion = location.Transformation()
+        local = range(1, mesh.NbNodes() + 1)
+        points = [mesh.Node(k).Transformed(motion).Coord() for k in local]
+        uv = np.array([mesh.UVNode(k).Coord() for k in local])
+        index = np.full(len(points), -1)
+        self._join_edges(face, mesh, location, points, index)
+        for k in np.flatnonzero(index < 0):
+            index[k] = self._new(points[k])
+        corners = np.array([mesh.Triangle(k).Get() for k in range(1, mesh.NbTriangles() + 1)]) - 1
+        if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED:
+            corners = corners[:, ::-1]
+        triangles = index[corners]
+        whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+        self.triangles.append((triangles[whole], np.full(whole.sum(), number), uv[corners[whole]]))
+
+    def tessellation(self) -> Tessellation:
+        empty = (np.empty((0, 2), dtype=np.int64), np.empty(0, dtype=np.int64), np.empty((0, 2)))
+        columns = [np.concatenate(column) for column in zip(*self.triangles, strict=True)]
+        columns += [np.concatenate(column) for column in zip(empty, *self.segments, strict=True)]
+        return Tessellation(self.brep, np.array(self.points), *columns)
+
+    def _new(self, point: tuple[float, float, float]) -> int:
+        self.points.append(point)
+        return len(self.points) - 1
+
+    def _join_edges(self, face: Any, mesh: Any, location: Any, points: list, index: Integers) -> None:
+        """Give the nodes along the edges of a face the index they have in the neighbouring face."""
+        from OCP.BRep import BRep_Tool
+        from OCP.TopAbs import TopAbs_ShapeEnum
+        from OCP.TopExp import TopExp, TopExp_Explorer
+        from OCP.TopoDS import TopoDS
+
+        explorer = TopExp_Explorer(face, TopAbs_ShapeEnum.TopAbs_EDGE)
+        while explorer.More():
+            edge = TopoDS.Edge_s(explorer.Current())
+            explorer.Next()
+            polygon = BRep_Tool.PolygonOnTriangulation_s(edge, mesh, location)
+            if polygon is None:
+                continue
+            nodes = [polygon.Node(k) - 1 for k in range(1, polygon.NbNodes() + 1)]
+            first = self._corner(TopExp.FirstVertex_s(edge), points[nodes[0]])
+            last = self._corner(TopExp.LastVertex_s(edge), points[nodes[-1]])
+            if BRep_Tool.Degenerated_s(edge):
+                index[nodes] = first
+                continue
+            which = self.edge_map.FindIndex(edge) - 1
+            if (which, len(nodes)) not in self.along:
+                vertices = [first, *(self._new(points[k]) for k in nodes[1:-1]), last]
+                t = np.array([polygon.Parameter(k) for k in range(1, len(nodes) + 1)])
+                pieces = np.stack([vertices[:-1], vertices[1:]], axis=1)
+                self.segments.append((pieces, np.full(len(pieces), which), np.stack([t[:-1], t[1:]], axis=1)))
+                self.along[which, len(nodes)] = vertices
+            index[nodes] = self.along[which, len(nodes)]
+
+    def _corner(self, vertex: Any, point: tuple[float, float, float]) -> int:
+        which = self.vertex_map.FindIndex(vertex)
+        if which == 0:
+            return self._new(point)
+        if which not in self.corners:
+            self.corners[which] = self._new(point)
+        return self.corners[which]
