@@ -1,0 +1,317 @@
+"""What the pictures say about each facet: project, sample, normalise and accumulate in one go; arrays only.
+
+The pictures k of a facet are compared as zero-mean, unit-variance grey levels z_k with their mean z over the views,
+weighted by w_k = s_k² (s_k the standard deviation of the facet in picture k, so that raw noise counts equally):
+
+    E = sum_k w_k |z_k - z|²,        for two views |z_1 - z_2|² / (1/s_1² + 1/s_2²).
+
+With tangents T (3, 2) of the surface and P_k = dx_k/dX (2, 3), one gradient G = sum_k w_k (P_k T)' g_k / s_k / sum w
+in the coordinates of the material serves all views, so that dz_k/dp = G . (P_k T)⁻¹ dx_k/dp. A motion that slides all
+pictures together over the surface then has the derivative zero, as it must; each picture's own, noisy gradient would
+give it a stiffness it has not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+
+from inspect3d.camera_kernel import distort, in_camera, project_with_slope
+from inspect3d.correlation.sampling_kernel import sample_cubic, sample_linear
+
+CHUNKS = 64
+FEWEST = 6
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def accumulate(stack, rig, points, taking, deviation, weights, power, columns, out):
+    """Write what every facet contributes to the normal equations.
+
+    Parameters
+    ----------
+    stack : levels (v, rows, columns), sizes (v, 2), cubic
+    rig : matrices (v, 3, 3), distortions (v, 5), rotations (v, 3, 3), translations (v, 3), origin (3,)
+    points : places (p, 3) mm, shapes (p, 3), starts (f + 1,), corners (f, 3), normals (n, 3)
+    taking : (f, v), the views that see the facet
+    deviation : (n,) mm
+    weights : (f,) of the facets in the sums over the cameras
+    power : how often those sums are multiplied by the facet's clean share
+    columns : (c,) the camera parameters of each view in the cross and camera blocks; see `camera_column`
+    out : arrays to be written, for C = v c: node (f, 3, 3), right (f, 3), cross (f, 3, C), camera (64, C, C),
+        camera_right (64, C), whole (f, C, C), each facet's camera block, or empty, statistics (f, 4): E, evaluation points, mean correlation of
+        the pictures, clean share
+    """
+    facets, views, c = len(taking), taking.shape[1], len(columns)
+    most = 1
+    for f in range(facets):
+        most = max(most, points[2][f + 1] - points[2][f])
+    for chunk in prange(CHUNKS):
+        grey = np.empty((views, most))
+        slopes, normal_slides = np.empty((views, most, 2)), np.empty((views, most, 2))
+        slides = np.empty((views, most, c, 2))
+        shape = np.empty((most, 3))
+        spread, sums = np.empty(views), np.empty((3, views, 3 + c))
+        column, seen = np.empty((views, 3 + views * c)), np.empty(views, np.int64)
+        block, right = np.empty((3 + views * c, 3 + views * c)), np.empty(3 + views * c)
+        for f in range(chunk * facets // CHUNKS, (chunk + 1) * facets // CHUNKS):
+            k_seen = 0
+            for k in range(views):
+                if taking[f, k]:
+                    seen[k_seen] = k
+                    k_seen += 1
+            out[6][f] = 0.0
+            n = 0
+            if k_seen >= 2:
+                n = _read(
+                    stack, rig, points, f, seen[:k_seen], deviation, columns, grey, slopes, normal_slides, slides, shape
+                )
+            if n < FEWEST or not _normalise(grey, k_seen, n, spread):
+                out[0][f], out[1][f], out[2][f] = 0.0, 0.0, 0.0
+                continue
+            _share(slopes, k_seen, n, spread)
+            _sum(grey, slopes, normal_slides, slides, shape, k_seen, n, c, spread, sums, column, block, right, out[6][f])
+            _deal(f, chunk, seen, k_seen, c, weights[f], power, block, right, out)
+
+
+@njit(cache=True, error_model="numpy")
+def _read(stack, rig, points, f, seen, deviation, columns, grey, slopes, normal_slides, slides, shape):
+    """Sample the views at a facet's points; return how many points count.
+
+    Writes grey levels, their slopes in the material (P T)' g, and how far over the material the picture slides when
+    the surface moves by one along its normal, (P T)⁻¹ P n, or a camera parameter grows by one, (P T)⁻¹ dx/dp.
+    """
+    places, shapes, starts, corners, normals = points
+    levels, sizes, cubic = stack
+    matrices, distortions, rotations, translations, origin = rig
+    a, b, d = corners[f]
+    n = 0
+    for p in range(starts[f], starts[f + 1]):
+        sa, sb, sd = shapes[p]
+        nx = sa * normals[a, 0] + sb * normals[b, 0] + sd * normals[d, 0]
+        ny = sa * normals[a, 1] + sb * normals[b, 1] + sd * normals[d, 1]
+        nz = sa * normals[a, 2] + sb * normals[b, 2] + sd * normals[d, 2]
+        length = np.sqrt(nx * nx + ny * ny + nz * nz)
+        nx, ny, nz = nx / length, ny / length, nz / length
+        sign = 1.0 if nz >= 0 else -1.0  # tangents without a branch: Duff et al., J. Comput. Graph. Tech. 6(1), 2017
+        e = -1.0 / (sign + nz)
+        g = nx * ny * e
+        t1x, t1y, t1z = 1.0 + sign * nx * nx * e, sign * g, -sign * nx
+        t2x, t2y, t2z = g, sign + ny * ny * e, -ny
+        lift = sa * deviation[a] + sb * deviation[b] + sd * deviation[d]
+        x, y, z = places[p, 0] + lift * nx, places[p, 1] + lift * ny, places[p, 2] + lift * nz
+        for m in range(len(seen)):
+            k = seen[m]
+            pixel, slope = project_with_slope(matrices[k], distortions[k], rotations[k], translations[k], x, y, z)
+            xx, xy, xz, yx, yy, yz = slope
+            if cubic:
+                v, gx, gy = sample_cubic(levels[k], sizes[k, 0], sizes[k, 1], pixel[0], pixel[1])
+            else:
+                v, gx, gy = sample_linear(levels[k], sizes[k, 0], sizes[k, 1], pixel[0], pixel[1])
+            m00, m01 = xx * t1x + xy * t1y + xz * t1z, xx * t2x + xy * t2y + xz * t2z
+            m10, m11 = yx * t1x + yy * t1y + yz * t1z, yx * t2x + yy * t2y + yz * t2z
+            over = 1.0 / (m00 * m11 - m01 * m10)
+            grey[m, n] = v
+            slopes[m, n, 0], slopes[m, n, 1] = m00 * gx + m10 * gy, m01 * gx + m11 * gy
+            dx, dy = xx * nx + xy * ny + xz * nz, yx * nx + yy * ny + yz * nz
+            normal_slides[m, n, 0] = over * (m11 * dx - m01 * dy)
+            normal_slides[m, n, 1] = over * (m00 * dy - m10 * dx)
+            if len(columns):
+                cx, cy, cz = in_camera(rotations[k], translations[k], x, y, z)
+                for j in range(len(columns)):
+                    if columns[j] < 6:
+                        mx, my, mz = _motion(columns[j], x - origin[0], y - origin[1], z - origin[2])
+                        dx, dy = xx * mx + xy * my + xz * mz, yx * mx + yy * my + yz * mz
+                    else:
+                        dx, dy = lens_slope(columns[j], matrices[k], distortions[k], cx / cz, cy / cz)
+                    slides[m, n, j, 0] = over * (m11 * dx - m01 * dy)
+                    slides[m, n, j, 1] = over * (m00 * dy - m10 * dx)
+        shape[n, 0], shape[n, 1], shape[n, 2] = sa, sb, sd
+        n += 1
+    return n
+
+
+@njit(cache=True, error_model="numpy")
+def _motion(column, x, y, z):
+    """Return how a point at (x, y, z) from the origin moves: turns about the axes (0 to 2), shifts along them (3 to 5)."""
+    if column == 0:
+        return 0.0, -z, y
+    if column == 1:
+        return z, 0.0, -x
+    if column == 2:
+        return -y, x, 0.0
+    return 1.0 * (column == 3), 1.0 * (column == 4), 1.0 * (column == 5)
+
+
+@njit(cache=True, error_model="numpy")
+def lens_slope(column, matrix, distortion, x, y):
+    """Return the derivative (dx, dy) of the pixel of the direction (x, y, 1) by fx, fy, cx, cy (6 to 9), k1, k2, p1, p2, k3."""
+    if column == 6 or column == 7:
+        u, v, _, _, _ = distort(x, y, distortion)
+        return (u, 0.0) if column == 6 else (0.0, v)
+    if column == 8 or column == 9:
+        return (1.0, 0.0) if column == 8 else (0.0, 1.0)
+    squared = x * x + y * y
+    if column == 12:
+        du, dv = 2.0 * x * y, squared + 2.0 * y * y
+    elif column == 13:
+        du, dv = squared + 2.0 * x * x, 2.0 * x * y
+    else:
+        radial = squared if column == 10 else squared * squared if column == 11 else squared * squared * squared
+        du, dv = x * radial, y * radial
+    return matrix[0, 0] * du + matrix[0, 1] * dv, matrix[1, 1] * dv
+
+
+@njit(cache=True, error_model="numpy")
+def _normalise(grey, views, n, spread):
+    """Bring each view's grey levels to mean 0 and variance 1; return False where one has no contrast at all."""
+    for m in range(views):
+        mean = 0.0
+        for q in range(n):
+            mean += grey[m, q]
+        mean /= n
+        square = 0.0
+        for q in range(n):
+            grey[m, q] -= mean
+            square += grey[m, q] * grey[m, q]
+        spread[m] = np.sqrt(square / n)
+        if not spread[m] > 1e-9 * (1.0 + abs(mean)):
+            return False
+        for q in range(n):
+            grey[m, q] /= spread[m]
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _share(slopes, views, n, spread):
+    """Turn each view's slopes into its part of the shared gradient, w_k (P_k T)' g_k / s_k / sum w."""
+    total = 0.0
+    for m in range(views):
+        total += spread[m] ** 2
+    for m in range(views):
+        part = spread[m] / total
+        for q in range(n):
+            slopes[m, q, 0] *= part
+            slopes[m, q, 1] *= part
+
+
+@njit(cache=True, error_model="numpy")
+def _sum(grey, slopes, normal_slides, slides, shape, views, n, c, spread, sums, column, block, right, statistics):
+    """Accumulate a facet's block of the normal matrix, its right-hand side and its statistics.
+
+    Local unknowns: three nodes, then c parameters of each view. `sums` holds, for each view, the sums over the points
+    of its rows by 1 (0) and by the mean profile z (1), which normalising takes out, and by the residual (2).
+    """
+    size = 3 + views * c
+    total, squares = 0.0, 0.0
+    for m in range(views):
+        total += spread[m] ** 2
+    for m in range(views):
+        squares += spread[m] ** 4 / total**2
+    block[:size, :size] = 0.0
+    sums[:, :views] = 0.0
+    energy, profile, agreement, noisy, clean = 0.0, 0.0, 0.0, 0.0, 0.0
+    for q in range(n):
+        gx, gy, mean, plain = 0.0, 0.0, 0.0, 0.0
+        slide_x, slide_y = 0.0, 0.0
+        for m in range(views):
+            share = spread[m] ** 2 / total
+            gx, gy = gx + slopes[m, q, 0], gy + slopes[m, q, 1]
+            mean += share * grey[m, q]
+            plain += grey[m, q]
+            slide_x, slide_y = slide_x + share * normal_slides[m, q, 0], slide_y + share * normal_slides[m, q, 1]
+        profile += mean * mean
+        agreement += plain * plain
+        nodes = shape[q, 0] ** 2 + shape[q, 1] ** 2 + shape[q, 2] ** 2
+        for m in range(views):
+            weight = spread[m] ** 2
+            residual = grey[m, q] - mean
+            energy += weight * residual * residual
+            ax, ay = normal_slides[m, q, 0] - slide_x, normal_slides[m, q, 1] - slide_y
+            own = 0.0
+            for l in range(views):
+                own += (slopes[l, q, 0] * ax + slopes[l, q, 1] * ay) ** 2
+            both = (gx * ax + gy * ay) ** 2
+            noisy += weight * nodes * both
+            clean += weight * nodes * (both - own) / (1.0 - squares)
+            along = gx * normal_slides[m, q, 0] + gy * normal_slides[m, q, 1]
+            for i in range(3):
+                row = along * shape[q, i]
+                sums[0, m, i] += row
+                sums[1, m, i] += row * mean
+                sums[2, m, i] += row * residual
+            for j in range(c):
+                row = gx * slides[m, q, j, 0] + gy * slides[m, q, j, 1]
+                sums[0, m, 3 + j] += row
+                sums[1, m, 3 + j] += row * mean
+                sums[2, m, 3 + j] += row * residual
+            _column(m, q, gx, gy, ax, ay, slides, shape, views, c, spread, total, column)
+            for i in range(size):
+                first = weight * column[m, i]
+                for j in range(i, size):
+                    block[i, j] += first * column[m, j]
+    _project(block, right, sums, views, n, c, spread, total, profile, column)
+    statistics[0], statistics[1] = energy, n
+    statistics[2] = (agreement / n - views) / (views * (views - 1))
+    statistics[3] = min(max(clean / noisy, 0.0), 1.0) if noisy > 0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _column(m, q, gx, gy, ax, ay, slides, shape, views, c, spread, total, column):
+    """Write the derivative of view m's residual z_m - z at point q by the local unknowns."""
+    across = gx * ax + gy * ay
+    for i in range(3):
+        column[m, i] = across * shape[q, i]
+    for l in range(views):
+        factor = (1.0 if l == m else 0.0) - spread[l] ** 2 / total
+        for j in range(c):
+            column[m, 3 + l * c + j] = factor * (gx * slides[l, q, j, 0] + gy * slides[l, q, j, 1])
+
+
+@njit(cache=True, error_model="numpy")
+def _project(block, right, sums, views, n, c, spread, total, profile, column):
+    """Take the mean and the mean profile, which normalising removes, out of the block; write the right-hand side."""
+    size = 3 + views * c
+    right[:size] = 0.0
+    for m in range(views):
+        weight = spread[m] ** 2
+        for i in range(3):
+            right[i] -= weight * sums[2, m, i]
+        for j in range(c):
+            right[3 + m * c + j] -= weight * sums[2, m, 3 + j]
+    for kind in range(2):
+        norm = 1.0 / n if kind == 0 else 1.0 / profile
+        for m in range(views):
+            for i in range(3):
+                column[m, i] = sums[kind, m, i]
+                for l in range(views):
+                    column[m, i] -= spread[l] ** 2 / total * sums[kind, l, i]
+            for l in range(views):
+                factor = (1.0 if l == m else 0.0) - spread[l] ** 2 / total
+                for j in range(c):
+                    column[m, 3 + l * c + j] = factor * sums[kind, l, 3 + j]
+            for i in range(size):
+                first = spread[m] ** 2 * norm * column[m, i]
+                for j in range(i, size):
+                    block[i, j] -= first * column[m, j]
+    for i in range(size):
+        for j in range(i):
+            block[i, j] = block[j, i]
+
+
+@njit(cache=True, error_model="numpy")
+def _deal(f, chunk, seen, views, c, weight, power, block, right, out):
+    """Deal a facet's block out to the arrays of all facets and all cameras; see `accumulate`."""
+    node, node_right, cross, camera, camera_right, whole, statistics = out
+    node[f], node_right[f] = block[:3, :3], right[:3]
+    cross[f] = 0.0
+    factor = weight * statistics[f, 3] ** power
+    for m in range(views):
+        at = seen[m] * c
+        cross[f, :, at : at + c] = block[:3, 3 + m * c : 3 + (m + 1) * c]
+        camera_right[chunk, at : at + c] += weight * right[3 + m * c : 3 + (m + 1) * c]
+        for l in range(views):
+            to = seen[l] * c
+            part = block[3 + m * c : 3 + (m + 1) * c, 3 + l * c : 3 + (l + 1) * c]
+            camera[chunk, at : at + c, to : to + c] += factor * part
+            if len(whole):
+                whole[f, at : at + c, to : to + c] = part
