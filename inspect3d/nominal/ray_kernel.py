@@ -46,17 +46,17 @@ def _first(ray: Floats, reach: float, tree: Tree, stack: Integers, lengths: Floa
     while waiting > 0:
         waiting -= 1
         node = stack[waiting]
-        if _entry(ray, tree.boxes, node) > least:
+        if box_entry(ray, tree.boxes, node) > least:
             continue
         if links[node, 0] == BRANCH:
             near, far = links[node, 1], links[node, 1] + 1
-            if _entry(ray, tree.boxes, far) < _entry(ray, tree.boxes, near):
+            if box_entry(ray, tree.boxes, far) < box_entry(ray, tree.boxes, near):
                 near, far = far, near
             stack[waiting], stack[waiting + 1] = far, near
             waiting += 2
             continue
         packet = links[node, 1]
-        _write_lengths(ray, tree.packets[packet], tree.packets.shape[2], lengths)
+        write_lengths(ray, tree.packets[packet], tree.packets.shape[2], lengths)
         for lane in range(LANES):
             member, length = tree.members[packet, lane], lengths[lane]
             if length < least or (length == least and length < np.inf and (triangle < 0 or member < triangle)):
@@ -65,7 +65,7 @@ def _first(ray: Floats, reach: float, tree: Tree, stack: Integers, lengths: Floa
 
 
 @njit(cache=True)
-def _entry(ray: Floats, boxes: Floats, node: int) -> float:
+def box_entry(ray: Floats, boxes: Floats, node: int) -> float:
     """Return how far along a ray a box begins, infinity where it is missed."""
     enter, leave = 0.0, np.inf
     for axis in range(3):
@@ -76,7 +76,7 @@ def _entry(ray: Floats, boxes: Floats, node: int) -> float:
 
 
 @njit(cache=True)
-def _write_lengths(ray: Floats, packet: Floats, lanes: int, lengths: Floats) -> None:
+def write_lengths(ray: Floats, packet: Floats, lanes: int, lengths: Floats) -> None:
     """Write how far along a ray the triangles of a packet are met, infinity where they are missed, all lanes at once.
 
     Notes
