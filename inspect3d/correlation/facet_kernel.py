@@ -69,7 +69,9 @@ def accumulate(stack, rig, points, taking, deviation, weights, power, columns, o
                 out[0][f], out[1][f], out[2][f] = 0.0, 0.0, 0.0
                 continue
             _share(slopes, k_seen, n, spread)
-            _sum(grey, slopes, normal_slides, slides, shape, k_seen, n, c, spread, sums, column, block, right, out[6][f])
+            _sum(
+                grey, slopes, normal_slides, slides, shape, k_seen, n, c, spread, sums, column, block, right, out[6][f]
+            )
             _deal(f, chunk, seen, k_seen, c, weights[f], power, block, right, out)
 
 

@@ -13,6 +13,7 @@ from inspect3d.camera import View
 from inspect3d.pose import Pose
 
 POSE, LENS = 6, 9
+DISTORTION = ("k1", "k2", "p1", "p2", "k3")
 Poses = Literal["known", "common", "free"]
 
 
@@ -69,6 +70,11 @@ class Freedom:
         lens = [*((6, 7) if open_lens[0] else ()), *(7 + k for k in range(1, 8) if open_lens[k])]
         return np.array([*(range(POSE) if self.poses != "known" else ()), *lens], dtype=np.int64)
 
+    @property
+    def unknowns(self) -> int:
+        """Return m, the number of unknowns."""
+        return len(self.spread(self.columns)[1])
+
     def spread(self, columns: Integers) -> tuple[Floats, Floats]:
         """Return Q (v c, m) and the sigmas (m,): the parameters `columns` of all views are Q times the unknowns."""
         views, c = len(self.lenses), len(columns)
@@ -97,6 +103,17 @@ class Freedom:
                     else:
                         row[k, at[7 + number]] = 1.0
         return np.array(rows).reshape(len(rows), views * c).T, np.array(sigmas)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return what each unknown is called, (m,)."""
+        motions = [f"{kind} {axis}" for kind in ("turn about", "shift along") for axis in "xyz"]
+        bodies = {"known": (), "common": ("the part",), "free": tuple(f"view {k + 1}" for k in range(len(self.lenses)))}
+        names = [f"{motion} of {body}" for body in bodies[self.poses] for motion in motions]
+        parts = ("focal length", "principal point x", "principal point y", *(f"distortion {c}" for c in DISTORTION))
+        for k, lens in enumerate(self.lenses):
+            names += [f"{part} of view {k + 1}" for part, sigma in zip(parts, lens.sigmas, strict=True) if sigma > 0]
+        return tuple(names)
 
     def moved(self, views: Sequence[View], step: Floats) -> tuple[View, ...]:
         """Return the views after a step (m,) of the unknowns."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from inspect3d.arrays import Floats
+from inspect3d.arrays import Floats, Integers
 from inspect3d.correlation.freedom import Freedom
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.scene import Scene
@@ -62,18 +62,27 @@ def stiffened(scene: Scene, values: Floats, stiffness: float) -> tuple[Floats, F
     return stiff, plate
 
 
-def system_of(scene: Scene, found: Facets, factors: Floats, noise: float, freedom: Freedom, stiffness: float) -> System:
+def system_of(
+    scene: Scene,
+    found: Facets,
+    factors: Floats,
+    noise: float,
+    freedom: Freedom,
+    columns: Integers,
+    stiffness: float = 0.0,
+) -> System:
     """Return the normal equations.
 
     Parameters
     ----------
     factors : (f,) weight of each facet times the power of its clean share with which `found` sums over the cameras
     noise : variance of the residuals, grey levels²
+    columns : camera parameters of each view in `found`
     stiffness : see `stiffened`
     """
     values, _ = stiffened(scene, scene.assembled(found.node * (factors / noise)[:, None, None]), stiffness)
     nodal, gauge = scene.ordering.factor(values), gauge_of(scene, freedom)
-    mixing, sigmas = freedom.spread(freedom.columns)
+    mixing, sigmas = freedom.spread(columns)
     cross = scene.gathered(found.cross * (factors / noise)[:, None, None]) @ mixing
     camera = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)
     return System(nodal, cross, camera, gauge)

@@ -98,8 +98,35 @@ class Scene:
         """Return nodal sums (n, ...) of what each facet gives its corners, (f, 3, ...)."""
         n, flat = len(self.nodes), parts.reshape(self.triangles.size, -1)
         nodes = self.triangles.ravel()
-        sums = np.stack([np.bincount(nodes, column, minlength=n) for column in flat.T], axis=1) if flat.size else flat[:n]
+        sums = (
+            np.stack([np.bincount(nodes, column, minlength=n) for column in flat.T], axis=1) if flat.size else flat[:n]
+        )
         return sums.reshape(n, *parts.shape[2:])
+
+    def restricted(self, kept: Booleans) -> tuple[Scene, Integers]:
+        """Return the scene of some facets (f,) only, and the number (k,) that each of its nodes has here."""
+        node, triangles = np.unique(self.triangles[kept], return_inverse=True)
+        counts = np.diff(self.points.starts)
+        chosen = np.repeat(kept, counts)
+        points = EvaluationPoints(
+            self.points.places[chosen],
+            self.points.shapes[chosen],
+            np.concatenate([[0], np.cumsum(counts[kept])]),
+            self.points.chord,
+        )
+        before = np.bincount(self.triangles.ravel(), np.repeat(counts, 3), minlength=len(self.nodes))
+        after = np.bincount(self.triangles[kept].ravel(), np.repeat(counts[kept], 3), minlength=len(self.nodes))
+        rest = Scene(
+            self.nodes[node],
+            self.normals[node],
+            triangles.reshape(-1, 3),
+            points,
+            self.taking[kept],
+            self.node[node],
+            self.facet[kept],
+            (self.share * after / before)[node],
+        )
+        return rest, node
 
     def smoother(self, weights: Floats) -> sparse.csr_matrix:
         """Return T = (I + M_lumped⁻¹ M) / 2 with the mass matrices of the facets weighted by `weights` (f,).

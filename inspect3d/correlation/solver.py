@@ -171,7 +171,7 @@ def _step(
         inverse = np.linalg.pinv(matrix * scale * scale[:, None], 1e-10, hermitian=True)
         return np.zeros(len(scene.nodes)), scale * (inverse @ (scale * camera_right))
     factors = state.weights * found.clean
-    system = system_of(scene, found, factors, noise, freedom, level.stiffness)
+    system = system_of(scene, found, factors, noise, freedom, freedom.columns, level.stiffness)
     right = scene.gathered(found.right * (state.weights / noise)[:, None])
     if level.stiffness > 0:
         _, plate = stiffened(scene, scene.assembled(found.node * (factors / noise)[:, None, None]), level.stiffness)

@@ -35,14 +35,14 @@ class System:
     gauge: Floats
 
     @cached_property
-    def _held(self) -> tuple[Floats, Floats]:
-        """K⁻¹C and (C'K⁻¹C)⁻¹."""
+    def held(self) -> tuple[Floats, Floats]:
+        """Return K⁻¹C (n, g) and (C'K⁻¹C)⁻¹ (g, g)."""
         solved = self.nodal.solve(self.gauge)
         return solved, np.linalg.inv(self.gauge.T @ solved)
 
     def constrained(self, right: Floats) -> Floats:
         """Return K̃ b for b (n,) or (n, k)."""
-        solved, inverse = self._held
+        solved, inverse = self.held
         return self.nodal.solve(right) - solved @ (inverse @ (solved.T @ right))
 
     @cached_property
@@ -56,8 +56,8 @@ class System:
         return self.camera - self.cross.T @ self.following
 
     @cached_property
-    def _spectrum(self) -> tuple[Floats, Floats]:
-        """Eigenvalues of R, ascending, in units in which S has the diagonal one, and the modes in those of p."""
+    def spectrum(self) -> tuple[Floats, Floats]:
+        """Return the eigenvalues of R, ascending, in units in which S has the diagonal one, and the modes in those of p."""
         scale = 1 / np.sqrt(np.diag(self.camera))
         values, vectors = np.linalg.eigh(self.reduced * scale * scale[:, None])
         return values, vectors * scale[:, None]
@@ -65,24 +65,24 @@ class System:
     @property
     def unseen(self) -> Floats:
         """Return the motions of the cameras that change no picture beyond what the shape makes up for, (k, m)."""
-        values, modes = self._spectrum
+        values, modes = self.spectrum
         return modes[:, values <= NOTHING].T
 
     @cached_property
     def camera_covariance(self) -> Floats:
         """Return R⁺, (m, m)."""
-        values, modes = self._spectrum
+        values, modes = self.spectrum
         seen = values > NOTHING
         return (modes[:, seen] / values[seen]) @ modes[:, seen].T
 
     def solve(self, right: Floats, camera_right: Floats) -> tuple[Floats, Floats]:
-        """Return the nodal motions u (n,) and the camera unknowns p (m,)."""
+        """Return the nodal motions u and the camera unknowns p for right-hand sides b (n,) and s (m,), or more columns."""
         cameras = self.camera_covariance @ (camera_right - self.following.T @ right)
         return self.constrained(right) - self.following @ cameras, cameras
 
     def variances(self, rows: sparse.csr_matrix) -> Floats:
         """Return the diagonal of T C T' for the covariance C of the nodes, and T of neighbours' weights."""
-        solved, inverse = self._held
+        solved, inverse = self.held
         held, following = rows @ solved, rows @ self.following
         by_cameras = np.einsum("ij,jk,ik->i", following, self.camera_covariance, following)
         return self.nodal.quadratic(rows) - np.einsum("ij,jk,ik->i", held, inverse, held) + by_cameras

@@ -49,7 +49,9 @@ def visibility(
     """
     triangles = nominal.mesh.triangles
     normals = unit(np.einsum("pi,pij->pj", points.shapes, nominal.mesh.normals[triangles[points.facet]]))
-    seen = np.stack([_seen(nominal, points, normals, view, steepest, mask) for view, mask in zip(views, masks, strict=True)])
+    seen = np.stack(
+        [_seen(nominal, points, normals, view, steepest, mask) for view, mask in zip(views, masks, strict=True)]
+    )
     counts = np.stack([np.add.reduceat(row, points.starts[:-1], dtype=np.int64) for row in seen], axis=1)
     taking = counts >= SHARE * np.diff(points.starts)[:, None]
     taking[taking.sum(axis=1) < 2] = False
