@@ -11,13 +11,13 @@ import numpy as np
 
 from inspect3d.camera import Camera
 from inspect3d.files.calibration import CameraSigma, Rig
+from inspect3d.files.calibration_camera import Sizes, checked_camera, require_one_each, require_size
 from inspect3d.outcome import InputError
 from inspect3d.pose import Pose
 
 KEYS = {"matrix", "distortion", "size", "camera_from_cad", "camera_from_rig", "sigma"}
+DEFAULTS = (("matrix", None), ("distortion", [0.0] * 5))
 SIGMAS = {"focal", "centre", "distortion", "rotation", "translation"}
-
-Sizes = tuple[tuple[int, int], ...]
 
 
 def read_calibration_json(text: str, name: str, sizes: Sizes) -> Rig:
@@ -29,8 +29,7 @@ def read_calibration_json(text: str, name: str, sizes: Sizes) -> Rig:
     if not isinstance(content, dict) or not isinstance(content.get("cameras"), list):
         raise InputError(f'{name} is no calibration: it wants {{ "cameras": [ ... ] }}, one entry per picture.')
     entries = content["cameras"]
-    if len(entries) != len(sizes):
-        raise InputError(f"{name} holds {len(entries)} cameras, and the recipe {len(sizes)} pictures: give one each.")
+    require_one_each(len(entries), len(sizes), name)
     cameras = tuple(_camera(*pair, f"{name}, camera {k}") for k, pair in enumerate(zip(entries, sizes, strict=True), 1))
     sigmas = tuple(_sigma(entry.get("sigma"), f"{name}, camera {k}") for k, entry in enumerate(entries, 1))
     placed = {key: [key in entry for entry in entries] for key in ("camera_from_cad", "camera_from_rig")}
@@ -74,13 +73,13 @@ def _camera(entry: Any, size: tuple[int, int], where: str) -> Camera:
         raise InputError(f"{where}: {unknown[0]!r} is unknown; the keys are {', '.join(sorted(KEYS))}.")
     if "matrix" not in entry:
         raise InputError(f"{where} has no matrix, which is [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels.")
-    stated = tuple(entry.get("size", size))
-    if stated != size:
-        raise InputError(f"{where} is of pictures of {_times(stated)} px, and this one has {_times(size)} px.")
     try:
-        return Camera(np.array(entry["matrix"], float), np.array(entry.get("distortion", [0.0] * 5), float), size)
+        width, height = entry.get("size", size)
+        matrix, distortion = (np.array(entry.get(key, default), float) for key, default in DEFAULTS)
     except (TypeError, ValueError) as error:
         raise InputError(f"{where}: {error}.") from error
+    require_size((width, height), size, where)
+    return checked_camera(matrix, distortion, size, where)
 
 
 def _poses(entries: list[Any], key: str, name: str) -> tuple[Pose, ...] | None:
@@ -108,7 +107,3 @@ def _sigma(content: Any, where: str) -> CameraSigma | None:
         return CameraSigma(focal, centre, distortion, rotation, translation)
     except (TypeError, ValueError) as error:
         raise InputError(f"{where}, sigma: {error}.") from error
-
-
-def _times(size: tuple[int, ...]) -> str:
-    return " x ".join(map(str, size))
