@@ -27,6 +27,8 @@ TWO_STEPS = (*CAMERAS, Level(0, 0, 20, "cameras"), *SHAPE)
 """Ways from coarse to fine: shape alone, cameras and shape together, and the paper's two steps."""
 
 NOISY = 25.0
+STEEPEST_TILT = 0.2
+ENOUGH = 0.3
 ROUNDS = 3
 
 
@@ -81,6 +83,7 @@ class Correlate:
         """
         pictures = Pictures(grey, self.interpolation)
         _require_sizes(pictures, views)
+        _require_different(pictures)
         seen = scene(
             nominal,
             views,
@@ -98,7 +101,7 @@ class Correlate:
         stack = pictures.blurred(0.0)
         for _ in range(ROUNDS):
             found = _found(seen, stack, state, last)
-            good = self._good(found)
+            good = self._good(found) & (seen.tilt(state.deviation) <= STEEPEST_TILT)
             if good.all():
                 break
             _require_some(good, found)
@@ -133,10 +136,19 @@ def _require_sizes(pictures: Pictures, views: Sequence[View]) -> None:
             )
 
 
+def _require_different(pictures: Pictures) -> None:
+    for k, one in enumerate(pictures.grey):
+        for other in range(k):
+            if np.array_equal(one, pictures.grey[other]):
+                raise MeasurementError(
+                    f"The pictures of cameras {other + 1} and {k + 1} are the same: each camera needs its own picture."
+                )
+
+
 def _require_some(good: Booleans, found: Facets) -> None:
-    if good.mean() < 0.2:
+    if good.mean() < ENOUGH:
         raise MeasurementError(
-            f"The pictures agree on {100 * good.mean():.0f} % of the surface only (median correlation "
-            f"{np.median(found.correlation):.2f}): check that they show this part with its speckle, in the order of "
-            "the cameras, and that the start of the cameras is right within half a speckle."
+            f"The pictures agree on a shape near the nominal one on {100 * good.mean():.0f} % of the surface only "
+            f"(median correlation {np.median(found.correlation):.2f}): check that they show this part with its "
+            "speckle, in the order of the cameras, and that these start within half a speckle of where they belong."
         )

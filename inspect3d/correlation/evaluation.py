@@ -1,4 +1,4 @@
-"""Where the pictures are compared: evaluation points, uniform in each facet of the inspection mesh (paper, figure 8)."""
+"""Where the pictures are compared: evaluation points, uniform in each facet of the mesh (paper, figure 8)."""
 
 from __future__ import annotations
 

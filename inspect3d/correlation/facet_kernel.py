@@ -16,15 +16,32 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
+from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.camera_kernel import distort, in_camera, project_with_slope
 from inspect3d.correlation.sampling_kernel import sample_cubic, sample_linear
 
+Stack = tuple[Floats, Integers, bool]
+Rig = tuple[Floats, Floats, Floats, Floats, Floats]
+Points = tuple[Floats, Floats, Integers, Integers, Floats]
+Out = tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats]
+
 CHUNKS = 64
 FEWEST = 6
+NOISIEST = 0.25
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def accumulate(stack, rig, points, taking, deviation, weights, power, columns, out):
+def accumulate(
+    stack: Stack,
+    rig: Rig,
+    points: Points,
+    taking: Booleans,
+    deviation: Floats,
+    weights: Floats,
+    power: int,
+    columns: Integers,
+    out: Out,
+) -> None:
     """Write what every facet contributes to the normal equations.
 
     Parameters
@@ -36,10 +53,11 @@ def accumulate(stack, rig, points, taking, deviation, weights, power, columns, o
     deviation : (n,) mm
     weights : (f,) of the facets in the sums over the cameras
     power : how often those sums are multiplied by the facet's clean share
-    columns : (c,) the camera parameters of each view in the cross and camera blocks; see `camera_column`
+    columns : (c,) the camera parameters of each view in the cross and camera blocks: turns 0
+        to 2, shifts 3 to 5, then as in `lens_slope`
     out : arrays to be written, for C = v c: node (f, 3, 3), right (f, 3), cross (f, 3, C), camera (64, C, C),
-        camera_right (64, C), whole (f, C, C), each facet's camera block, or empty, statistics (f, 4): E, evaluation points, mean correlation of
-        the pictures, clean share
+        camera_right (64, C), whole (f, C, C), each facet's camera
+        block, or empty, statistics (f, 4): E, evaluation points, mean correlation of the pictures, clean share
     """
     facets, views, c = len(taking), taking.shape[1], len(columns)
     most = 1
@@ -76,7 +94,20 @@ def accumulate(stack, rig, points, taking, deviation, weights, power, columns, o
 
 
 @njit(cache=True, error_model="numpy")
-def _read(stack, rig, points, f, seen, deviation, columns, grey, slopes, normal_slides, slides, shape):
+def _read(
+    stack: Stack,
+    rig: Rig,
+    points: Points,
+    f: int,
+    seen: Integers,
+    deviation: Floats,
+    columns: Integers,
+    grey: Floats,
+    slopes: Floats,
+    normal_slides: Floats,
+    slides: Floats,
+    shape: Floats,
+) -> int:
     """Sample the views at a facet's points; return how many points count.
 
     Writes grey levels, their slopes in the material (P T)' g, and how far over the material the picture slides when
@@ -133,8 +164,8 @@ def _read(stack, rig, points, f, seen, deviation, columns, grey, slopes, normal_
 
 
 @njit(cache=True, error_model="numpy")
-def _motion(column, x, y, z):
-    """Return how a point at (x, y, z) from the origin moves: turns about the axes (0 to 2), shifts along them (3 to 5)."""
+def _motion(column: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return how a point at (x, y, z) from the origin moves: in turns about the axes (0 to 2), in shifts (3 to 5)."""
     if column == 0:
         return 0.0, -z, y
     if column == 1:
@@ -145,8 +176,8 @@ def _motion(column, x, y, z):
 
 
 @njit(cache=True, error_model="numpy")
-def lens_slope(column, matrix, distortion, x, y):
-    """Return the derivative (dx, dy) of the pixel of the direction (x, y, 1) by fx, fy, cx, cy (6 to 9), k1, k2, p1, p2, k3."""
+def lens_slope(column: int, matrix: Floats, distortion: Floats, x: float, y: float) -> tuple[float, float]:
+    """Return the derivative (dx, dy) of the pixel of (x, y, 1) by fx, fy, cx, cy (6 to 9), k1, k2, p1, p2, k3."""
     if column == 6 or column == 7:
         u, v, _, _, _ = distort(x, y, distortion)
         return (u, 0.0) if column == 6 else (0.0, v)
@@ -164,7 +195,7 @@ def lens_slope(column, matrix, distortion, x, y):
 
 
 @njit(cache=True, error_model="numpy")
-def _normalise(grey, views, n, spread):
+def _normalise(grey: Floats, views: int, n: int, spread: Floats) -> bool:
     """Bring each view's grey levels to mean 0 and variance 1; return False where one has no contrast at all."""
     for m in range(views):
         mean = 0.0
@@ -184,7 +215,7 @@ def _normalise(grey, views, n, spread):
 
 
 @njit(cache=True, error_model="numpy")
-def _share(slopes, views, n, spread):
+def _share(slopes: Floats, views: int, n: int, spread: Floats) -> None:
     """Turn each view's slopes into its part of the shared gradient, w_k (P_k T)' g_k / s_k / sum w."""
     total = 0.0
     for m in range(views):
@@ -197,7 +228,22 @@ def _share(slopes, views, n, spread):
 
 
 @njit(cache=True, error_model="numpy")
-def _sum(grey, slopes, normal_slides, slides, shape, views, n, c, spread, sums, column, block, right, statistics):
+def _sum(
+    grey: Floats,
+    slopes: Floats,
+    normal_slides: Floats,
+    slides: Floats,
+    shape: Floats,
+    views: int,
+    n: int,
+    c: int,
+    spread: Floats,
+    sums: Floats,
+    column: Floats,
+    block: Floats,
+    right: Floats,
+    statistics: Floats,
+) -> None:
     """Accumulate a facet's block of the normal matrix, its right-hand side and its statistics.
 
     Local unknowns: three nodes, then c parameters of each view. `sums` holds, for each view, the sums over the points
@@ -230,8 +276,8 @@ def _sum(grey, slopes, normal_slides, slides, shape, views, n, c, spread, sums, 
             energy += weight * residual * residual
             ax, ay = normal_slides[m, q, 0] - slide_x, normal_slides[m, q, 1] - slide_y
             own = 0.0
-            for l in range(views):
-                own += (slopes[l, q, 0] * ax + slopes[l, q, 1] * ay) ** 2
+            for other in range(views):
+                own += (slopes[other, q, 0] * ax + slopes[other, q, 1] * ay) ** 2
             both = (gx * ax + gy * ay) ** 2
             noisy += weight * nodes * both
             clean += weight * nodes * (both - own) / (1.0 - squares)
@@ -254,23 +300,48 @@ def _sum(grey, slopes, normal_slides, slides, shape, views, n, c, spread, sums, 
     _project(block, right, sums, views, n, c, spread, total, profile, column)
     statistics[0], statistics[1] = energy, n
     statistics[2] = (agreement / n - views) / (views * (views - 1))
-    statistics[3] = min(max(clean / noisy, 0.0), 1.0) if noisy > 0 else 0.0
+    statistics[3] = min(max(clean / noisy, NOISIEST), 1.0) if noisy > 0 else NOISIEST
 
 
 @njit(cache=True, error_model="numpy")
-def _column(m, q, gx, gy, ax, ay, slides, shape, views, c, spread, total, column):
+def _column(
+    m: int,
+    q: int,
+    gx: float,
+    gy: float,
+    ax: float,
+    ay: float,
+    slides: Floats,
+    shape: Floats,
+    views: int,
+    c: int,
+    spread: Floats,
+    total: float,
+    column: Floats,
+) -> None:
     """Write the derivative of view m's residual z_m - z at point q by the local unknowns."""
     across = gx * ax + gy * ay
     for i in range(3):
         column[m, i] = across * shape[q, i]
-    for l in range(views):
-        factor = (1.0 if l == m else 0.0) - spread[l] ** 2 / total
+    for other in range(views):
+        factor = (1.0 if other == m else 0.0) - spread[other] ** 2 / total
         for j in range(c):
-            column[m, 3 + l * c + j] = factor * (gx * slides[l, q, j, 0] + gy * slides[l, q, j, 1])
+            column[m, 3 + other * c + j] = factor * (gx * slides[other, q, j, 0] + gy * slides[other, q, j, 1])
 
 
 @njit(cache=True, error_model="numpy")
-def _project(block, right, sums, views, n, c, spread, total, profile, column):
+def _project(
+    block: Floats,
+    right: Floats,
+    sums: Floats,
+    views: int,
+    n: int,
+    c: int,
+    spread: Floats,
+    total: float,
+    profile: float,
+    column: Floats,
+) -> None:
     """Take the mean and the mean profile, which normalising removes, out of the block; write the right-hand side."""
     size = 3 + views * c
     right[:size] = 0.0
@@ -285,12 +356,12 @@ def _project(block, right, sums, views, n, c, spread, total, profile, column):
         for m in range(views):
             for i in range(3):
                 column[m, i] = sums[kind, m, i]
-                for l in range(views):
-                    column[m, i] -= spread[l] ** 2 / total * sums[kind, l, i]
-            for l in range(views):
-                factor = (1.0 if l == m else 0.0) - spread[l] ** 2 / total
+                for other in range(views):
+                    column[m, i] -= spread[other] ** 2 / total * sums[kind, other, i]
+            for other in range(views):
+                factor = (1.0 if other == m else 0.0) - spread[other] ** 2 / total
                 for j in range(c):
-                    column[m, 3 + l * c + j] = factor * sums[kind, l, 3 + j]
+                    column[m, 3 + other * c + j] = factor * sums[kind, other, 3 + j]
             for i in range(size):
                 first = spread[m] ** 2 * norm * column[m, i]
                 for j in range(i, size):
@@ -301,7 +372,18 @@ def _project(block, right, sums, views, n, c, spread, total, profile, column):
 
 
 @njit(cache=True, error_model="numpy")
-def _deal(f, chunk, seen, views, c, weight, power, block, right, out):
+def _deal(
+    f: int,
+    chunk: int,
+    seen: Integers,
+    views: int,
+    c: int,
+    weight: float,
+    power: int,
+    block: Floats,
+    right: Floats,
+    out: Out,
+) -> None:
     """Deal a facet's block out to the arrays of all facets and all cameras; see `accumulate`."""
     node, node_right, cross, camera, camera_right, whole, statistics = out
     node[f], node_right[f] = block[:3, :3], right[:3]
@@ -311,9 +393,9 @@ def _deal(f, chunk, seen, views, c, weight, power, block, right, out):
         at = seen[m] * c
         cross[f, :, at : at + c] = block[:3, 3 + m * c : 3 + (m + 1) * c]
         camera_right[chunk, at : at + c] += weight * right[3 + m * c : 3 + (m + 1) * c]
-        for l in range(views):
-            to = seen[l] * c
-            part = block[3 + m * c : 3 + (m + 1) * c, 3 + l * c : 3 + (l + 1) * c]
+        for other in range(views):
+            to = seen[other] * c
+            part = block[3 + m * c : 3 + (m + 1) * c, 3 + other * c : 3 + (other + 1) * c]
             camera[chunk, at : at + c, to : to + c] += factor * part
             if len(whole):
                 whole[f, at : at + c, to : to + c] = part

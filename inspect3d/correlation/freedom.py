@@ -96,7 +96,7 @@ class Freedom:
                     row = np.zeros((views, c))
                     sigmas.append(float(sigma))
                     rows.append(row)
-                    if number == 0 and 6 not in at or number > 0 and 7 + number not in at:
+                    if (6 if number == 0 else 7 + number) not in at:
                         continue
                     if number == 0:
                         row[k, at[6]], row[k, at[7]] = 1.0, matrix[1, 1] / matrix[0, 0]
@@ -114,6 +114,22 @@ class Freedom:
         for k, lens in enumerate(self.lenses):
             names += [f"{part} of view {k + 1}" for part, sigma in zip(parts, lens.sigmas, strict=True) if sigma > 0]
         return tuple(names)
+
+    def scale(self, views: Sequence[View], points: Floats) -> Floats:
+        """Return the change of each unknown that moves the pictures of points (n, 3) mm by one pixel rms, (m,)."""
+        places = np.concatenate([view.project(points) for view in views])
+        found = np.empty(self.unknowns)
+        for k, size in enumerate(self._trials):
+            step = np.zeros(len(found))
+            step[k] = size
+            moved = np.concatenate([view.project(points) for view in self.moved(views, step)])
+            found[k] = size / np.sqrt(((moved - places) ** 2).sum(axis=1).mean())
+        return found
+
+    @property
+    def _trials(self) -> list[float]:
+        """Small changes of the unknowns."""
+        return [1e-6 if name.startswith(("turn", "distortion")) else 1e-3 for name in self.names]
 
     def moved(self, views: Sequence[View], step: Floats) -> tuple[View, ...]:
         """Return the views after a step (m,) of the unknowns."""

@@ -84,7 +84,8 @@ def _unseen(scene: Scene, system: System, freedom: Freedom) -> list[HiddenMotion
     together = poses.mean(axis=1)
     apart = np.linalg.norm(poses - together[:, None], axis=(1, 2))
     as_one = apart < ALIKE * np.linalg.norm(poses, axis=(1, 2))
-    motions = together[as_one] / np.array([length] * 3 + [1.0] * 3)
+    basis = np.linalg.qr(together[as_one].T)[0].T
+    motions = basis / np.array([length] * 3 + [1.0] * 3)
     flat = np.zeros(len(scene.nodes))
     words = [f"{motion.words}: the surface stays in itself" for motion in named(motions, scene.centre, length)]
     words += ["a change of the cameras against each other that the pictures do not show"] * int((~as_one).sum())

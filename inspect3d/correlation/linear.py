@@ -55,7 +55,8 @@ def stiffened(scene: Scene, values: Floats, stiffness: float) -> tuple[Floats, F
     """
     every = np.arange(len(scene.nodes))
     diagonal = scene.position(every, every)
-    median = float(np.median(values[diagonal]))
+    stiff_ones = values[diagonal][values[diagonal] > 0]
+    median = float(np.median(stiff_ones)) if len(stiff_ones) else 1.0
     plate = stiffness * median * scene.plate
     stiff = values + plate + SUPPORT * median * scene.plate
     stiff[diagonal] += RIDGE * median
@@ -69,6 +70,7 @@ def system_of(
     noise: float,
     freedom: Freedom,
     columns: Integers,
+    scale: Floats,
     stiffness: float = 0.0,
 ) -> System:
     """Return the normal equations.
@@ -78,6 +80,7 @@ def system_of(
     factors : (f,) weight of each facet times the power of its clean share with which `found` sums over the cameras
     noise : variance of the residuals, grey levels²
     columns : camera parameters of each view in `found`
+    scale : (m,) of each camera unknown, what moves the pictures by one pixel; see `Freedom.scale`
     stiffness : see `stiffened`
     """
     values, _ = stiffened(scene, scene.assembled(found.node * (factors / noise)[:, None, None]), stiffness)
@@ -85,4 +88,4 @@ def system_of(
     mixing, sigmas = freedom.spread(columns)
     cross = scene.gathered(found.cross * (factors / noise)[:, None, None]) @ mixing
     camera = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)
-    return System(nodal, cross, camera, gauge)
+    return System(nodal, cross, camera, gauge, scale)

@@ -57,7 +57,7 @@ def sample_linear(picture: Floats, width: int, height: int, x: float, y: float) 
 
 
 @njit(cache=True)
-def sample_all(picture, cubic, places, found):
+def sample_all(picture: Floats, cubic: bool, places: Floats, found: Floats) -> None:
     """Write value and gradient (n, 3) of a picture at places (n, 2) px; `cubic`: it holds B-spline coefficients."""
     height, width = picture.shape
     for n in range(len(places)):

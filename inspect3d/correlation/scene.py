@@ -92,16 +92,27 @@ class Scene:
     def assembled(self, blocks: Floats) -> Floats:
         """Return the values in the pattern of a sum of 3 x 3 blocks (f, 3, 3)."""
         size = len(self.ordering.columns)
-        return np.bincount(self.positions.ravel(), blocks.ravel(), minlength=size).astype(np.float64)
+        values = np.zeros(size)
+        values += np.bincount(self.positions.ravel(), blocks.ravel(), minlength=size)
+        return values
 
     def gathered(self, parts: Floats) -> Floats:
         """Return nodal sums (n, ...) of what each facet gives its corners, (f, 3, ...)."""
-        n, flat = len(self.nodes), parts.reshape(self.triangles.size, -1)
-        nodes = self.triangles.ravel()
-        sums = (
-            np.stack([np.bincount(nodes, column, minlength=n) for column in flat.T], axis=1) if flat.size else flat[:n]
-        )
+        n, nodes = len(self.nodes), self.triangles.ravel()
+        flat = parts.reshape(len(nodes), int(np.prod(parts.shape[2:])))
+        sums = np.empty((n, flat.shape[1]))
+        for k, column in enumerate(flat.T):
+            sums[:, k] = np.bincount(nodes, column, minlength=n)
         return sums.reshape(n, *parts.shape[2:])
+
+    def tilt(self, deviation: Floats) -> Floats:
+        """Return the slope of the deviation over each facet, (f,): by how much (rad) it turns the surface."""
+        a, b, c = (self.nodes[self.triangles[:, k]] for k in range(3))
+        normal = np.cross(b - a, c - a)
+        double = np.linalg.norm(normal, axis=1, keepdims=True)
+        u = deviation[self.triangles, None]
+        sides = u[:, 0] * (c - b) + u[:, 1] * (a - c) + u[:, 2] * (b - a)
+        return np.linalg.norm(np.cross(normal / double, sides), axis=1) / double[:, 0]
 
     def restricted(self, kept: Booleans) -> tuple[Scene, Integers]:
         """Return the scene of some facets (f,) only, and the number (k,) that each of its nodes has here."""
@@ -202,6 +213,6 @@ def scene(
 def _unseen(views: Sequence[View], seen: Booleans) -> str:
     shares = ", ".join(f"{100 * row.mean():.0f} %" for row in seen)
     return (
-        f"No part of the surface is seen by two of the {len(views)} cameras (they see {shares} of it): check the poses, "
-        "and that the normals of the part point out of the material."
+        f"No part of the surface is seen by two of the {len(views)} cameras (they see {shares} of it): check the "
+        "poses, and that the normals of the part point out of the material."
     )

@@ -74,7 +74,7 @@ class Shape:
 
     @cached_property
     def residual(self) -> Floats:
-        """Return the normalised residual of each node of the mesh: sqrt((1 - correlation) / 2) of its facets' mean; NaN unseen."""
+        """Return sqrt((1 - r) / 2) of each node of the mesh, r the mean correlation of its facets; NaN where unseen."""
         scene = self.scene
         weights = self.scene.gathered(np.ones((len(scene.triangles), 3)))
         sums = scene.gathered(np.repeat(self.facets.correlation[:, None], 3, axis=1))

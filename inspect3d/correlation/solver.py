@@ -164,14 +164,14 @@ def _step(
     scene: Scene, found: Facets, noise: float, state: State, freedom: Freedom, level: Level
 ) -> tuple[Floats, Floats]:
     mixing, sigmas = freedom.spread(freedom.columns)
+    scale = freedom.scale(state.views, scene.nodes)
     camera_right = mixing.T @ found.camera_right / noise - freedom.offset(state.views) / sigmas**2
     if level.moves == "cameras":
         matrix = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)
-        scale = 1 / np.sqrt(np.diag(matrix))
         inverse = np.linalg.pinv(matrix * scale * scale[:, None], 1e-10, hermitian=True)
         return np.zeros(len(scene.nodes)), scale * (inverse @ (scale * camera_right))
     factors = state.weights * found.clean
-    system = system_of(scene, found, factors, noise, freedom, freedom.columns, level.stiffness)
+    system = system_of(scene, found, factors, noise, freedom, freedom.columns, scale, level.stiffness)
     right = scene.gathered(found.right * (state.weights / noise)[:, None])
     if level.stiffness > 0:
         _, plate = stiffened(scene, scene.assembled(found.node * (factors / noise)[:, None, None]), level.stiffness)

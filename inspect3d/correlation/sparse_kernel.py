@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from inspect3d.arrays import Floats, Integers
+
 
 @njit(cache=True)
-def symbolic(starts, columns):
+def symbolic(starts: Integers, columns: Integers) -> tuple[Integers, Integers]:
     """Return parents in the elimination tree and entries per column of L, (n,), for a symmetric matrix in rows."""
     n = len(starts) - 1
     parents, counts, flags = np.full(n, -1), np.zeros(n, np.int64), np.arange(n)
@@ -25,7 +27,9 @@ def symbolic(starts, columns):
 
 
 @njit(cache=True)
-def factored(starts, columns, values, parents, counts):
+def factored(
+    starts: Integers, columns: Integers, values: Floats, parents: Integers, counts: Integers
+) -> tuple[Integers, Integers, Floats, Floats]:
     """Return L, unit lower triangular, by columns (starts, rows ascending, values), and the diagonal D of A = L D L'.
 
     Notes
@@ -73,7 +77,7 @@ def factored(starts, columns, values, parents, counts):
 
 
 @njit(cache=True)
-def solve(begins, rows, lower, diagonal, x):
+def solve(begins: Integers, rows: Integers, lower: Floats, diagonal: Floats, x: Floats) -> None:
     """Overwrite the right-hand sides x (n, m) by A⁻¹ x."""
     n = len(diagonal)
     for j in range(n):
@@ -86,7 +90,7 @@ def solve(begins, rows, lower, diagonal, x):
 
 
 @njit(cache=True)
-def inverted(begins, rows, lower, diagonal):
+def inverted(begins: Integers, rows: Integers, lower: Floats, diagonal: Floats) -> tuple[Floats, Floats]:
     """Return the entries of A⁻¹ where L has any (same order as L's), and its diagonal.
 
     Notes
@@ -119,7 +123,7 @@ def inverted(begins, rows, lower, diagonal):
 
 
 @njit(cache=True)
-def entry(begins, rows, inverse, inverse_diagonal, i, j):
+def entry(begins: Integers, rows: Integers, inverse: Floats, inverse_diagonal: Floats, i: int, j: int) -> float:
     """Return entry (i, j) of the inverse; the pair must lie in the pattern of L."""
     if i == j:
         return inverse_diagonal[i]
@@ -135,7 +139,15 @@ def entry(begins, rows, inverse, inverse_diagonal, i, j):
 
 
 @njit(cache=True)
-def quadratic(begins, rows, inverse, inverse_diagonal, starts, columns, values):
+def quadratic(
+    begins: Integers,
+    rows: Integers,
+    inverse: Floats,
+    inverse_diagonal: Floats,
+    starts: Integers,
+    columns: Integers,
+    values: Floats,
+) -> Floats:
     """Return t' A⁻¹ t for each row t of a sparse matrix (starts, columns, values)."""
     forms = np.zeros(len(starts) - 1)
     for r in range(len(forms)):
@@ -147,7 +159,7 @@ def quadratic(begins, rows, inverse, inverse_diagonal, starts, columns, values):
 
 
 @njit(cache=True)
-def blocks(begins, rows, inverse, inverse_diagonal, corners):
+def blocks(begins: Integers, rows: Integers, inverse: Floats, inverse_diagonal: Floats, corners: Integers) -> Floats:
     """Return the 3 x 3 blocks of A⁻¹ at the corners (f, 3) of triangles, (f, 3, 3)."""
     found = np.empty((len(corners), 3, 3))
     for f in range(len(corners)):

@@ -27,18 +27,20 @@ class System:
     cross : B (n, m), for m unknowns of the cameras, which may be none
     camera : S (m, m)
     gauge : C (n, g), orthonormal columns, which may be none
+    scale : (m,) the units of the unknowns p in which their stiffnesses compare
     """
 
     nodal: Factor
     cross: Floats
     camera: Floats
     gauge: Floats
+    scale: Floats
 
     @cached_property
     def held(self) -> tuple[Floats, Floats]:
         """Return K⁻¹C (n, g) and (C'K⁻¹C)⁻¹ (g, g)."""
         solved = self.nodal.solve(self.gauge)
-        return solved, np.linalg.inv(self.gauge.T @ solved)
+        return solved, np.asarray(np.linalg.inv(self.gauge.T @ solved), dtype=np.float64)
 
     def constrained(self, right: Floats) -> Floats:
         """Return K̃ b for b (n,) or (n, k)."""
@@ -57,10 +59,11 @@ class System:
 
     @cached_property
     def spectrum(self) -> tuple[Floats, Floats]:
-        """Return the eigenvalues of R, ascending, in units in which S has the diagonal one, and the modes in those of p."""
-        scale = 1 / np.sqrt(np.diag(self.camera))
-        values, vectors = np.linalg.eigh(self.reduced * scale * scale[:, None])
-        return values, vectors * scale[:, None]
+        """Return the eigenvalues of R in units of `scale`, ascending, over the largest one of S, and the modes of p."""
+        both = self.scale * self.scale[:, None]
+        stiffest = float(np.linalg.eigvalsh(self.camera * both)[-1]) if len(self.scale) else 1.0
+        values, vectors = np.linalg.eigh(self.reduced * both / stiffest)
+        return values, vectors * self.scale[:, None] / np.sqrt(stiffest)
 
     @property
     def unseen(self) -> Floats:
@@ -76,7 +79,7 @@ class System:
         return (modes[:, seen] / values[seen]) @ modes[:, seen].T
 
     def solve(self, right: Floats, camera_right: Floats) -> tuple[Floats, Floats]:
-        """Return the nodal motions u and the camera unknowns p for right-hand sides b (n,) and s (m,), or more columns."""
+        """Return the nodal motions u and camera unknowns p for right-hand sides b (n,) and s (m,), or more columns."""
         cameras = self.camera_covariance @ (camera_right - self.following.T @ right)
         return self.constrained(right) - self.following @ cameras, cameras
 

@@ -66,7 +66,7 @@ class Uncertainty:
         return self.smoother @ (self.system.covariance(back) + self.shifts @ (self.shifts.T @ back))
 
     def variances_without(self, modes: Floats, solver: Floats) -> Floats:
-        """Return the diagonal for the field less its modes, (I - J M) v, with J = `modes` (n, k) and M = `solver` (k, n)."""
+        """Return the diagonal for the field less its modes, (I - J M) v: J = `modes` (n, k) and M = `solver` (k, n)."""
         crossed = self.covariance(np.ascontiguousarray(solver.T))
         between = np.einsum("ij,jk,ik->i", modes, solver @ crossed, modes)
         return self.variances - 2 * np.einsum("ij,ij->i", modes, crossed) + between
@@ -99,13 +99,14 @@ def uncertainty(
     found = facets(scene, stack, views, deviation, weights, columns, power=2, whole=systematic is not None)
     noise = noise_of(found, weights, len(scene.nodes) + freedom.unknowns)
     factors = weights * found.clean**2
-    first = system_of(scene, found, factors, noise, freedom, columns)
+    scale = freedom.scale(views, scene.nodes)
+    first = system_of(scene, found, factors, noise, freedom, columns, scale)
     correlated = _correlated(scene, found, weights / noise, first, freedom.spread(columns)[0])
-    system = system_of(scene, found, factors, noise * correlated, freedom, columns)
+    system = system_of(scene, found, factors, noise * correlated, freedom, columns, scale)
     shifts = np.zeros((len(scene.nodes), 0))
     if systematic is not None:
-        scale = weights * found.clean / (noise * correlated)
-        shifts = _shifts(scene, found, scale, system, freedom.spread(columns)[0], columns, systematic)
+        shares = weights * found.clean / (noise * correlated)
+        shifts = _shifts(scene, found, shares, system, freedom.spread(columns)[0], columns, systematic)
     return Uncertainty(system, shifts, scene.smoother(weights), noise, correlated)
 
 
@@ -135,20 +136,20 @@ def _correlated(scene: Scene, found: Facets, weights: Floats, system: System, mi
 def _shifts(
     scene: Scene,
     found: Facets,
-    scale: Floats,
+    shares: Floats,
     system: System,
     mixing: Floats,
     columns: Integers,
     systematic: Systematic,
 ) -> Floats:
-    """Return the response F (n, r) of the shape to each mode of the systematic field, in each picture and coordinate."""
+    """Return the response F (n, r) of the shape to the modes of the systematic field, by picture and coordinate."""
     fields = systematic.size * _modes(scene.nodes[scene.triangles].mean(axis=1), systematic.length)
     c = len(columns)
     responses = []
     for view in range(scene.taking.shape[1]):
         for column in (SHIFT_X, SHIFT_Y):
             at = view * c + int(np.searchsorted(columns, column))
-            weighted = scale[:, None] * fields
+            weighted = shares[:, None] * fields
             nodal = scene.gathered(found.cross[:, :, at, None] * weighted[:, None, :])
             cameras = mixing.T @ (found.whole[:, :, at].T @ weighted)
             responses.append(system.solve(nodal, cameras)[0])

@@ -55,7 +55,8 @@ def visibility(
     counts = np.stack([np.add.reduceat(row, points.starts[:-1], dtype=np.int64) for row in seen], axis=1)
     taking = counts >= SHARE * np.diff(points.starts)[:, None]
     taking[taking.sum(axis=1) < 2] = False
-    used = (seen | ~taking[points.facet].T).all(axis=0) & taking.any(axis=1)[points.facet]
+    taken = taking[points.facet]
+    used = np.all(seen.T | ~taken, axis=1) & np.any(taken, axis=1)
     return Visibility(seen, taking, used)
 
 
