@@ -132,6 +132,7 @@ def test_pycolmap_projects_a_point_to_the_same_place(tmp_path):
     np.testing.assert_allclose(read.cameras[0].project(point[None])[0], expected, atol=1e-9)
 
 
+@pytest.mark.data
 @needs_data
 def test_vic3d_and_dice_calibrations_of_one_rig_tell_the_same_rig():
     folder, sizes = DATA / "dice_dspecimen", ((1920, 1200),) * 2
@@ -146,6 +147,7 @@ def test_vic3d_and_dice_calibrations_of_one_rig_tell_the_same_rig():
     assert dice.cameras[0].distortion[4] == pytest.approx(55.92468005109)
 
 
+@pytest.mark.data
 @needs_data
 def test_a_vic3d_rig_sees_the_specimen_at_its_plane():
     rig = load_calibration((DATA / "dice_dspecimen" / "cal_vic3d.xml",), PAIR, ((1920, 1200),) * 2)
@@ -154,6 +156,7 @@ def test_a_vic3d_rig_sees_the_specimen_at_its_plane():
         assert np.all((pixel > 0) & (pixel < camera.size))
 
 
+@pytest.mark.data
 @needs_data
 def test_a_rendered_plate_of_dice_is_seen_by_its_cameras():
     rig = load_calibration((DATA / "dice_epipolar_plane_synthetic" / "cal.xml",), PAIR, ((1920, 1080),) * 2)
@@ -163,6 +166,52 @@ def test_a_rendered_plate_of_dice_is_seen_by_its_cameras():
     np.testing.assert_allclose(rig.cameras[1].distortion, [-0.2361956, -0.0985805, 0, 0, -0.3652319], atol=1e-6)
     middle = View(rig.cameras[1], rig.camera_from_rig[1]).project([[0.0, 0.0, 15.0]])[0]
     assert np.abs(middle - [959.5, 539.5]).max() < 100
+
+
+def triangulated(rig, pictures):
+    """Return the points (n, 3) of the rig that SIFT finds in both pictures, those off their plane left out."""
+    sift = cv2.SIFT_create(nfeatures=4000)
+    (spots, words), (others, known) = (sift.detectAndCompute(picture, None) for picture in pictures)
+    pairs = [
+        first for first, second in cv2.BFMatcher().knnMatch(words, known, k=2) if first.distance < 0.7 * second.distance
+    ]
+    pixels = [spots[pair.queryIdx].pt for pair in pairs], [others[pair.trainIdx].pt for pair in pairs]
+    places = [camera.undistorted(np.array(seen)).T for camera, seen in zip(rig.cameras, pixels, strict=True)]
+    points = cv2.triangulatePoints(*(pose.matrix[:3] for pose in rig.camera_from_rig), *places)
+    points = (points[:3] / points[3]).T
+    for _ in range(6):
+        away = np.abs(off_plane(points))
+        points = points[away < 4 * 1.4826 * np.median(away)]
+    return points
+
+
+def off_plane(points):
+    middle = points.mean(axis=0)
+    return (points - middle) @ np.linalg.svd(points - middle, full_matrices=False)[2][2]
+
+
+@pytest.mark.data
+@needs_data
+@pytest.mark.parametrize("name", ["cal_vic3d.xml", "cal_pyaldic_dice_format.xml"])
+def test_a_flat_sheet_is_flat_within_15_um_by_either_calibration(name):
+    folder = DATA / "dice_dspecimen"
+    rig = load_calibration((folder / name,), PAIR, ((1920, 1200),) * 2)
+    pictures = [cv2.imread(str(folder / "images" / f"GT4-0000_{k}.tif"), cv2.IMREAD_GRAYSCALE) for k in (0, 1)]
+    points = triangulated(rig, pictures)
+    assert len(points) > 1500
+    assert off_plane(points).std() < 0.015
+
+
+@pytest.mark.data
+@needs_data
+def test_a_rendered_plate_stands_where_it_was_rendered_after_undistortion():
+    folder = DATA / "dice_epipolar_plane_synthetic"
+    rig = load_calibration((folder / "cal.xml",), PAIR, ((1920, 1080),) * 2)
+    pictures = [cv2.imread(str(folder / f"{side}_dist.png"), cv2.IMREAD_GRAYSCALE) for side in ("left", "right")]
+    points = triangulated(rig, pictures)
+    assert len(points) > 1500
+    assert np.median(points[:, 2]) == pytest.approx(15.0, abs=0.001)
+    assert off_plane(points).std() < 0.002
 
 
 DICE = """<ParameterList><ParameterList name="CAMERA 0">
