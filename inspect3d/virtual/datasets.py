@@ -17,6 +17,7 @@ from inspect3d.virtual.laser_scanner import LaserScanner
 from inspect3d.virtual.milled import MilledSizes, milled
 from inspect3d.virtual.picture_dataset import PictureDataset
 from inspect3d.virtual.picture_truth import PictureTruth
+from inspect3d.virtual.plan import load_plan
 from inspect3d.virtual.random_pose import random_pose
 from inspect3d.virtual.stereo_datasets import PHOTOGRAPHED
 from inspect3d.virtual.truth import Truth
@@ -88,19 +89,24 @@ noise = 0.02                     # mm, standard noise of a point
 
 
 def make_dataset(name: str, folder: Path, seed: int = 0) -> Truth | PictureTruth:
-    """Make one of `DATASETS` and write it into a folder.
+    """Make one of `DATASETS`, or what a plan asks for, and write it into a folder.
 
     Parameters
     ----------
+    name : of a dataset, or the path of a plan, a TOML file; see `load_plan`
     seed : of everything random; the same seed gives the same files
 
     Raises
     ------
     InputError
-        There is no dataset of that name, or the folder cannot be written.
+        There is no dataset of that name, the plan is wrong, or the folder cannot be written.
     """
+    if name.endswith(".toml"):
+        return load_plan(Path(name), seed).write(folder, seed)
     if name not in DATASETS:
-        raise InputError(f"There is no virtual dataset {name!r}; choose one of {', '.join(DATASETS)}.")
+        raise InputError(
+            f"There is no virtual dataset {name!r}; choose one of {', '.join(DATASETS)}, or give a plan.toml."
+        )
     return DATASETS[name](seed).write(folder, seed)
 
 
