@@ -21,6 +21,7 @@ from inspect3d.virtual.sensor import Sensor
 from inspect3d.virtual.speckle import Speckle
 from inspect3d.virtual.stereo_rig import StereoRig
 from inspect3d.virtual.virtual_camera import VirtualCamera
+from inspect3d.virtual.warp import Warp
 from tests.jit import printed
 
 SMALL = StereoRig(scale=4.0, focal=1640.0, size=(300, 250), offset=2.0)
@@ -148,6 +149,30 @@ def test_a_picture_of_a_plane_is_its_paint_at_the_back_projected_pixels(flat):
     assert np.count_nonzero(inside) > 30_000
     expected = Speckle(dot=2.0, seed=3)(on_plane[inside])
     np.testing.assert_allclose(light.ravel()[inside], expected, atol=1e-6)
+
+
+def test_a_warped_picture_shows_at_a_pixel_what_stands_beside_it(flat):
+    warp = Warp(tau=1.5, length=60.0, seed=4)
+    view, light = plane_picture(flat, 0.0, samples=1, blur=0.0, warp=warp)
+    pixels = grid(view) + warp(np.arange(300.0), np.arange(250.0)).reshape(-1, 2)
+    rays = lines_of_sight(view, pixels)
+    on_plane = view.centre - (view.centre[2] / rays[:, 2])[:, None] * rays
+    inside = np.all((on_plane[:, :2] > 0.1) & (on_plane[:, :2] < [103.9, 83.9]), axis=1)
+    np.testing.assert_allclose(light.ravel()[inside], Speckle(dot=2.0, seed=3)(on_plane[inside]), atol=1e-6)
+
+
+def test_a_warp_has_its_size_and_its_length():
+    at = np.array([0.0, 30.0, 60.0, 500.0])
+    values = np.array([Warp(2.0, 60.0, seed)(at, np.array([7.0, 8.0]))[0] for seed in range(600)])
+    assert values.std() == pytest.approx(2.0, rel=0.05)
+    correlation = np.corrcoef(values[:, :, 0].T)[0]
+    np.testing.assert_allclose(correlation, [1.0, np.exp(-1 / 8), np.exp(-1 / 2), 0.0], atol=0.12)
+
+
+def test_a_warp_is_the_same_field_whichever_band_of_the_picture_asks():
+    warp, columns, rows = Warp(0.5, 80.0, 1), np.arange(40.0), np.arange(200.0)
+    whole = warp(columns, rows)
+    np.testing.assert_allclose(warp(columns, rows[150:160]), whole[150:160], atol=2e-4)
 
 
 def test_a_plane_raised_is_a_camera_lowered(flat):

@@ -20,6 +20,7 @@ rig = { cameras = 3, angle = 40, scale = 2.0, focal = 900, size = [320, 260] }
 camera = { blur = 0.8, lamp = [0.3, 0.2, 1.0] }
 sensor = { bits = 12, noise = 0.02 }
 speckle = { dot = 2.5 }
+warp = { tau = 0.02, length = 80 }
 
 [[deviations]]
 kind = "Bump"
@@ -56,6 +57,12 @@ def test_a_plan_makes_pictures_of_a_part_of_ones_own(folder):
     assert truth.noise == 0.02
 
 
+def test_every_lens_of_a_plan_has_its_own_unknown_error(folder):
+    cameras = planned(folder, PLAN).cameras
+    assert {camera.warp.tau for camera in cameras} == {0.02}
+    assert len({camera.warp.seed for camera in cameras}) == 3
+
+
 def test_a_plan_gives_its_angle_in_degrees_and_aims_at_the_middle_of_the_part(folder):
     dataset = planned(folder, 'cad = "block.step"\nrig = { angle = 30, scale = 3.0, focal = 1000, size = [320, 240] }')
     vertices = dataset.part.surface().vertices
@@ -82,6 +89,8 @@ def test_a_plan_gives_its_angle_in_degrees_and_aims_at_the_middle_of_the_part(fo
         ('cad = "block.step"\ntarget = [1, 2]', "target"),
         ('cad = "block.step"\nsensor = { bits = 9 }', "8, 12 or 16"),
         ('cad = "block.step"\ncamera = { view = 1 }', "'view' is unknown"),
+        ('cad = "block.step"\nwarp = { tau = 0.1 }', "length"),
+        ('cad = "block.step"\nwarp = { tau = -0.1, length = 9 }', "not negative"),
         ('cad = "block.step"\ndeviations = [ { kind = "Dent" } ]', "no deviation field"),
         ('cad = "block.step"\ndeviations = [ { kind = "Bump" } ]', "deviations"),
         ('cad = "block.step"\ndeviations = [ 3 ]', "deviations"),

@@ -11,6 +11,7 @@ from typing import Any, TypeVar, get_type_hints
 
 import numpy as np
 
+from inspect3d.arrays import Floats
 from inspect3d.outcome import InputError
 from inspect3d.virtual.camera_knowledge import CameraKnowledge, LensesKnown, places_known, rig_known
 from inspect3d.virtual.deviation_field import Sum, field_of
@@ -21,8 +22,9 @@ from inspect3d.virtual.speckle import Speckle
 from inspect3d.virtual.stereo_datasets import CAMERAS, HEAD, PLACED, knowing
 from inspect3d.virtual.stereo_rig import StereoRig
 from inspect3d.virtual.virtual_camera import VirtualCamera
+from inspect3d.virtual.warp import Warp
 
-KEYS = {"cad", "element_size", "knowledge", "target", "rig", "camera", "sensor", "speckle", "deviations"}
+KEYS = {"cad", "element_size", "knowledge", "target", "rig", "camera", "sensor", "speckle", "warp", "deviations"}
 KNOWLEDGE: Mapping[str, CameraKnowledge | None] = MappingProxyType(
     {"places": places_known, "rig": rig_known, "lenses": LensesKnown(), "picks": None}
 )
@@ -35,8 +37,9 @@ def load_plan(path: Path, seed: int) -> PictureDataset:
 
     Its keys are `cad`, `element_size` (mm), `knowledge` of the cameras (places, rig, lenses or picks; by default
     places) and `target` (mm, by default the middle of the part); its tables `[rig]`, `[camera]`, `[sensor]` and
-    `[speckle]` hold the settings of `StereoRig` (its angle in degrees), `VirtualCamera`, `Sensor` and `Speckle`, and
-    each `[[deviations]]` a deviation field: its kind and parameters.
+    `[speckle]` hold the settings of `StereoRig` (its angle in degrees), `VirtualCamera`, `Sensor` and `Speckle`,
+    `[warp]` the `tau` and `length` of an unknown error of each lens, and each `[[deviations]]` a deviation field: its
+    kind and parameters.
 
     Raises
     ------
@@ -61,14 +64,10 @@ def load_plan(path: Path, seed: int) -> PictureDataset:
     vertices = part.surface().vertices
     middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     target = _value(tuple[float, float, float], plan.get("target", tuple(middle)), f"{path.name}, target")
-    sensor = _made(Sensor, _table(plan, "sensor", path.name), f"{path.name}, [sensor]")
-    cameras = tuple(
-        _made(VirtualCamera, _table(plan, "camera", path.name), f"{path.name}, [camera]", view=view, sensor=sensor)
-        for view in rig(np.array(target), seed)
-    )
     paint = {"dot": 6.0 / rig.scale, "seed": seed, **_table(plan, "speckle", path.name)}
     element_size = _value(float, plan.get("element_size", float(np.ptp(vertices, axis=0).max()) / 40), path.name)
     recipe = HEAD.format(title=part.name, name=path.name, element_size=f"{element_size:.3g}") + CAMERAS + PLACED
+    cameras = _cameras(plan, path.name, rig, np.array(target), seed)
     dataset = PictureDataset(
         part,
         _deviation(plan, path.name),
@@ -78,6 +77,20 @@ def load_plan(path: Path, seed: int) -> PictureDataset:
         places_known,
     )
     return dataset if knowledge == "places" else knowing(dataset, KNOWLEDGE[knowledge])
+
+
+def _cameras(
+    plan: Mapping[str, Any], name: str, rig: StereoRig, target: Floats, seed: int
+) -> tuple[VirtualCamera, ...]:
+    """Return the cameras of a rig with the sensor and the light that a plan gives them, each warped in its own way."""
+    sensor = _made(Sensor, _table(plan, "sensor", name), f"{name}, [sensor]")
+    light = _table(plan, "camera", name)
+    cameras = []
+    seeds = np.random.SeedSequence((seed, rig.cameras)).generate_state(rig.cameras).tolist()
+    for view, lens in zip(rig(target, seed), seeds, strict=True):
+        warp = _made(Warp, _table(plan, "warp", name), f"{name}, [warp]", seed=lens) if "warp" in plan else None
+        cameras.append(_made(VirtualCamera, light, f"{name}, [camera]", view=view, sensor=sensor, warp=warp))
+    return tuple(cameras)
 
 
 def _toml(path: Path) -> dict[str, Any]:
@@ -123,7 +136,7 @@ def _made(kind: type[Made], table: Mapping[str, Any], where: str, **given: Any) 
     values = {key: _value(hints[key], value, f"{where}, {key}") for key, value in table.items()}
     try:
         return kind(**values, **given)
-    except ValueError as error:
+    except (TypeError, ValueError) as error:
         raise InputError(f"{where}: {error}.") from error
 
 

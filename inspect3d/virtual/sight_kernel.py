@@ -20,46 +20,43 @@ LENS_SETTLED = 1e-13
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def write_sights(
-    matrix: Floats, distortion: Floats, rotation: Floats, columns: Floats, rows: Floats, directions: Floats
-) -> bool:
-    """Write the unit directions (n, 3), CAD frame, in which the pixels of a grid look, row by row.
+def write_sights(matrix: Floats, distortion: Floats, rotation: Floats, pixels: Floats, directions: Floats) -> bool:
+    """Write the unit directions (n, 3), CAD frame, in which pixels look.
 
     Parameters
     ----------
+    pixels : (n, 2) px; fast where neighbours follow each other
     matrix, distortion : of the camera
     rotation : (3, 3), of camera_from_cad
-    columns, rows : px, of the grid
-    directions : (len(rows) * len(columns), 3), written
+    directions : (n, 3), written
 
     Returns
     -------
     Whether the distortion could be undone everywhere.
     """
-    n = 0
-    for i in range(len(rows)):
-        wanted_y = (rows[i] - matrix[1, 2]) / matrix[1, 1]
-        x, y = (columns[0] - matrix[0, 2] - matrix[0, 1] * wanted_y) / matrix[0, 0], wanted_y
-        for j in range(len(columns)):
-            wanted_x = (columns[j] - matrix[0, 2] - matrix[0, 1] * wanted_y) / matrix[0, 0]
-            settled = False
-            for _ in range(LENS_ROUNDS):
-                u, v, u_x, u_y, v_y = distort(x, y, distortion)
-                scale = u_x * v_y - u_y * u_y
-                if not scale > 0.0:
-                    return False
-                step_x = ((wanted_x - u) * v_y - (wanted_y - v) * u_y) / scale
-                step_y = ((wanted_y - v) * u_x - (wanted_x - u) * u_y) / scale
-                x, y = x + step_x, y + step_y
-                if step_x * step_x + step_y * step_y < LENS_SETTLED:
-                    settled = True
-                    break
-            if not settled:
+    x = y = last_x = last_y = 0.0
+    for i in range(len(pixels)):
+        wanted_y = (pixels[i, 1] - matrix[1, 2]) / matrix[1, 1]
+        wanted_x = (pixels[i, 0] - matrix[0, 2] - matrix[0, 1] * wanted_y) / matrix[0, 0]
+        x, y = x + wanted_x - last_x, y + wanted_y - last_y
+        last_x, last_y = wanted_x, wanted_y
+        settled = False
+        for _ in range(LENS_ROUNDS):
+            u, v, u_x, u_y, v_y = distort(x, y, distortion)
+            scale = u_x * v_y - u_y * u_y
+            if not scale > 0.0:
                 return False
-            length = np.sqrt(x * x + y * y + 1.0)
-            for axis in range(3):
-                directions[n, axis] = (rotation[0, axis] * x + rotation[1, axis] * y + rotation[2, axis]) / length
-            n += 1
+            step_x = ((wanted_x - u) * v_y - (wanted_y - v) * u_y) / scale
+            step_y = ((wanted_y - v) * u_x - (wanted_x - u) * u_y) / scale
+            x, y = x + step_x, y + step_y
+            settled = step_x * step_x + step_y * step_y < LENS_SETTLED
+            if settled:
+                break
+        if not settled:
+            return False
+        length = np.sqrt(x * x + y * y + 1.0)
+        for axis in range(3):
+            directions[i, axis] = (rotation[0, axis] * x + rotation[1, axis] * y + rotation[2, axis]) / length
     return True
 
 

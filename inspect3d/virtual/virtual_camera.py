@@ -15,6 +15,7 @@ from inspect3d.outcome import InputError
 from inspect3d.virtual.deviation_field import Vector
 from inspect3d.virtual.scene import Scene
 from inspect3d.virtual.sensor import Sensor
+from inspect3d.virtual.warp import Warp
 
 BAND = 1 << 17  # rays that one thread works on at a time
 
@@ -35,6 +36,7 @@ class VirtualCamera:
     ambient : share of the light that comes from everywhere, where there is a lamp
     vignetting : share of the light lost at the corners of the picture, growing with the square of the radius
     background : light where there is no part
+    warp : a smooth error of the lens, which neither `view` nor a calibration knows; None is none
     sensor : what makes grey levels of the light
     """
 
@@ -45,6 +47,7 @@ class VirtualCamera:
     ambient: float = 0.4
     vignetting: float = 0.0
     background: float = 0.03
+    warp: Warp | None = None
     sensor: Sensor = field(default_factory=Sensor)
 
     def __post_init__(self) -> None:
@@ -89,8 +92,11 @@ class VirtualCamera:
         from inspect3d.virtual.sight_kernel import write_sights
 
         camera, pose = self.view.camera, self.view.camera_from_cad
+        pixels = np.stack(np.meshgrid(columns, rows), axis=-1)
+        if self.warp is not None:
+            pixels += self.warp(columns, rows)
         directions = np.empty((len(rows) * len(columns), 3))
-        if not write_sights(camera.matrix, camera.distortion, pose.rotation, columns, rows, directions):
+        if not write_sights(camera.matrix, camera.distortion, pose.rotation, pixels.reshape(-1, 2), directions):
             raise InputError("The distortion of the lens cannot be undone over the whole picture: lower k1, k2 or k3.")
         sights = scene.sights(self.view.centre, directions)
         light = np.full(len(directions), self.background)
