@@ -1,6 +1,7 @@
 """Truths about set-ups that a user plans: a part and a rig of one's own, or a sentence on what is wrong."""
 
 import tomllib
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -8,9 +9,11 @@ import pytest
 
 from inspect3d.outcome import InputError
 from inspect3d.recipe import Recipe
-from inspect3d.virtual.datasets import make_dataset
+from inspect3d.virtual.bracket import bracket
+from inspect3d.virtual.datasets import DATASETS, make_dataset
 from inspect3d.virtual.milled import milled
 from inspect3d.virtual.plan import load_plan
+from inspect3d.virtual.scene import Scene
 
 PLAN = """\
 cad = "block.step"
@@ -55,6 +58,21 @@ def test_a_plan_makes_pictures_of_a_part_of_ones_own(folder):
         assert 255 < picture.max() <= 4095
     assert truth.deviation(np.array([[50.0, 35.0, 30.0]]))[0] == pytest.approx(0.2)
     assert truth.noise == 0.02
+
+
+def test_the_plan_in_the_manual_can_be_followed(tmp_path):
+    bracket().write_step(tmp_path / "part.step")
+    manual = (Path(__file__).parents[1] / "docs" / "virtual_rig.md").read_text(encoding="utf-8")
+    dataset = planned(tmp_path, manual.split("```toml")[1].split("```")[0])
+    scene = Scene(dataset.part.surface(), dataset.deviation, dataset.speckle)
+    picture = dataset.cameras[0](scene, 0)
+    assert picture.shape == (512, 612)
+    assert np.mean(picture > 1000) > 0.2
+
+
+def test_the_manual_names_every_dataset():
+    manual = (Path(__file__).parents[1] / "docs" / "virtual_rig.md").read_text(encoding="utf-8")
+    assert all(f"`{name}`" in manual for name in DATASETS)
 
 
 def test_every_lens_of_a_plan_has_its_own_unknown_error(folder):
