@@ -12,8 +12,10 @@ from inspect3d.recipe import Recipe
 from inspect3d.virtual.bracket import bracket
 from inspect3d.virtual.datasets import DATASETS, make_dataset
 from inspect3d.virtual.milled import milled
+from inspect3d.virtual.picture_truth import PictureTruth
 from inspect3d.virtual.plan import load_plan
 from inspect3d.virtual.scene import Scene
+from inspect3d.virtual.warp import Warp
 
 PLAN = """\
 cad = "block.step"
@@ -58,6 +60,8 @@ def test_a_plan_makes_pictures_of_a_part_of_ones_own(folder):
         assert 255 < picture.max() <= 4095
     assert truth.deviation(np.array([[50.0, 35.0, 30.0]]))[0] == pytest.approx(0.2)
     assert truth.noise == 0.02
+    assert PictureTruth.read(folder / "out" / "truth.json").warps == truth.warps
+    assert truth.warps[0] == Warp(0.02, 80.0, truth.warps[0].seed)
 
 
 def test_the_plan_in_the_manual_can_be_followed(tmp_path):

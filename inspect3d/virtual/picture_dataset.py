@@ -70,15 +70,17 @@ class PictureDataset:
         """
         views = tuple(camera.view for camera in self.cameras)
         scene = Scene(self.part.surface(), self.deviation, self.speckle)
-        truth = PictureTruth(self.deviation, views, max(camera.sensor.noise for camera in self.cameras), seed)
+        warps = tuple(camera.warp for camera in self.cameras)
+        noise = max(camera.sensor.noise for camera in self.cameras)
+        truth = PictureTruth(self.deviation, views, warps, noise, seed)
         seeds = [int(value) for value in np.random.SeedSequence(seed).generate_state(len(views) + 2)]
         rows = picks(scene, views, self.picked, self.picking_noise, seeds[-1]).rows() if self.picked else ""
         focal = float(np.mean([view.camera.matrix[0, 0] for view in views])) * (1.0 + self.focal_error)
         values = {"images": ", ".join(f'"{name}"' for name in self.names), "focal": f"{focal:.1f}", "landmarks": rows}
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            for name, camera, noise in zip(self.names, self.cameras, seeds, strict=False):
-                (folder / name).write_bytes(_png(camera, scene, noise))
+            for name, camera, own in zip(self.names, self.cameras, seeds, strict=False):
+                (folder / name).write_bytes(_png(camera, scene, own))
             if self.knowledge is not None:
                 rig = self.knowledge(views, np.random.default_rng(seeds[-2]))
                 write_calibration_json(folder / "calibration.json", rig)

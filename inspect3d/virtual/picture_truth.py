@@ -12,6 +12,7 @@ from inspect3d.camera import Camera, View
 from inspect3d.outcome import InputError
 from inspect3d.pose import Pose
 from inspect3d.virtual.deviation_field import DeviationField, described, field_of
+from inspect3d.virtual.warp import Warp
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,12 +24,14 @@ class PictureTruth:
     deviation : how the part differs from its CAD; at nodes (n, 3) mm of the inspection mesh, `deviation(nodes)` is
         the true map, (n,) mm
     views : the true cameras in their true places, in the order of the pictures
+    warps : what their distortion leaves out; None for a lens without such an error
     noise : standard noise of the grey levels, as a share of full scale
     seed : of everything
     """
 
     deviation: DeviationField
     views: tuple[View, ...]
+    warps: tuple[Warp | None, ...]
     noise: float
     seed: int
 
@@ -40,8 +43,9 @@ class PictureTruth:
                 "distortion": view.camera.distortion.tolist(),
                 "size": list(view.camera.size),
                 "camera_from_cad": view.camera_from_cad.matrix.tolist(),
+                "warp": None if warp is None else vars(warp),
             }
-            for view in self.views
+            for view, warp in zip(self.views, self.warps, strict=True)
         ]
         content = {
             "schema": 1,
@@ -71,6 +75,7 @@ class PictureTruth:
                 )
                 for camera in content["cameras"]
             )
-            return cls(field_of(content["deviation"]), views, float(content["noise"]), int(content["seed"]))
+            warps = tuple(camera["warp"] and Warp(**camera["warp"]) for camera in content["cameras"])
+            return cls(field_of(content["deviation"]), views, warps, float(content["noise"]), int(content["seed"]))
         except (OSError, KeyError, TypeError, ValueError) as error:
             raise InputError(f"{path} holds no truth of virtual photographs: {error}") from error
