@@ -10,9 +10,11 @@ import numpy as np
 from inspect3d.arrays import Booleans, Floats, unit
 from inspect3d.camera import View
 from inspect3d.correlation.evaluation import EvaluationPoints
-from inspect3d.nominal.nominal import Nominal
+from inspect3d.nominal.nominal import InspectionMesh, Nominal
 
 MARGIN = 3.0
+OUTLINE = 4.0
+FINE = 4
 SHARE = 0.5
 LIFT = 1e-4
 
@@ -38,7 +40,8 @@ def visibility(
 ) -> Visibility:
     """Return which points are seen by rays from the cameras to the nominal surface.
 
-    A camera sees a point that lies in its picture (three pixels within the border) and mask, whose normal leans at
+    A camera sees a point that lies in its picture (three pixels within the border), four pixels or more within the
+    outline of the part, where a blurred picture mixes it with what is behind, and in the mask; whose normal leans at
     most `steepest` rad towards the line of sight, and that no other part of the nominal surface hides. A view takes
     part in a facet of which it sees at least half the points.
 
@@ -70,8 +73,9 @@ def _seen(
     near = np.flatnonzero(seen)
     pixels = view.project(points.places[near])
     inside = (pixels >= MARGIN).all(axis=1) & (pixels <= np.array(view.camera.size) - 1 - MARGIN).all(axis=1)
+    at = np.clip(np.rint(pixels), 0, np.array(view.camera.size) - 1).astype(np.int64)
+    inside &= _within_outline(nominal.mesh, view)[at[:, 1], at[:, 0]]
     if mask is not None:
-        at = np.clip(np.rint(pixels), 0, np.array(view.camera.size) - 1).astype(np.int64)
         inside &= mask[at[:, 1], at[:, 0]]
     near = near[inside]
     lift = LIFT * nominal.diagonal + 2 * points.chord
@@ -79,3 +83,21 @@ def _seen(
     seen[:] = False
     seen[near] = hits.triangle < 0
     return seen
+
+
+def _within_outline(mesh: InspectionMesh, view: View) -> Booleans:
+    """Return the pixels (rows, columns) that lie well inside the picture of the facets that face the camera."""
+    import cv2
+
+    width, height = view.camera.size
+    corners = mesh.nodes[mesh.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing = ((view.centre - corners[:, 0]) * normals).sum(axis=1) > 0
+    ahead = (view.depth(mesh.nodes) > 0)[mesh.triangles].all(axis=1)
+    shown = corners[facing & ahead].reshape(-1, 3)
+    pixels = np.clip(view.project(shown), -4 * width, 5 * width).reshape(-1, 3, 2)
+    filled = np.zeros((height, width), np.uint8)
+    for triangle in np.rint(pixels * 2**FINE).astype(np.int32):
+        cv2.fillConvexPoly(filled, triangle, 1, shift=FINE)
+    framed = cv2.copyMakeBorder(filled, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
+    return np.asarray(cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1] > OUTLINE)
