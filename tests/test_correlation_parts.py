@@ -8,12 +8,12 @@ from scipy import sparse
 
 from inspect3d.camera import View
 from inspect3d.correlation.evaluation import centres, evaluation_points, points_per_edge
-from inspect3d.correlation.facet_kernel import lens_slope
 from inspect3d.correlation.factor import Ordering
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.linear import gauge_of
 from inspect3d.correlation.normal import facets
 from inspect3d.correlation.picture import Pictures
+from inspect3d.correlation.reading_kernel import lens_slope
 from inspect3d.correlation.scene import scene
 from inspect3d.correlation.visibility import visibility
 from inspect3d.nominal.nominal import Nominal
@@ -271,6 +271,7 @@ from tests.test_correlation_parts import ALL, STEEPEST, accumulated
 from tests.sheets import sheet
 from tests.speckled import rig
 from inspect3d.correlation.picture import Pictures
+from inspect3d.correlation.reading_kernel import lens_slope
 from inspect3d.correlation.scene import scene
 nominal, views = sheet(edge=30.0, fine=7.5), rig()
 seen = scene(nominal, views, 1e9, STEEPEST, [None, None])

@@ -10,6 +10,7 @@ import numpy as np
 
 from inspect3d.arrays import Floats, Integers
 from inspect3d.camera import View
+from inspect3d.correlation.evaluation import EvaluationPoints
 from inspect3d.correlation.picture import Stack
 from inspect3d.correlation.scene import Scene
 
@@ -68,6 +69,7 @@ def facets(
     columns: Integers,
     power: int = 1,
     whole: bool = False,
+    points: EvaluationPoints | None = None,
 ) -> Facets:
     """Return what the pictures say about every facet.
 
@@ -79,6 +81,7 @@ def facets(
     power : how often the sums over the cameras take the clean share of the curvature: 0, the curvature as it is; 1,
         the curvature without gradient noise H₀; 2, the information H₀ A⁻¹ H₀ of an estimate that has noisy slopes
     whole : keep each facet's camera block
+    points : to compare at, some of the scene's; none: all of them
     """
     from inspect3d.correlation.facet_kernel import CHUNKS, accumulate
 
@@ -90,7 +93,7 @@ def facets(
         np.stack([view.camera_from_cad.translation for view in views]),
         np.asarray(scene.centre),
     )
-    points = scene.points
+    points = points or scene.points
     out = (
         np.empty((f, 3, 3)),
         np.empty((f, 3)),

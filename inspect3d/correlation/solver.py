@@ -20,6 +20,7 @@ from inspect3d.outcome import MeasurementError
 from inspect3d.register.mobility import spread
 
 SLOW, DAMPING, LEAST, PATIENCE = 0.7, 0.7, 0.25, 4
+COARSE = 5e-4
 Moves = Literal["cameras", "shape", "both"]
 
 
@@ -84,7 +85,9 @@ class Solver:
     Parameters
     ----------
     levels : in their order
-    tolerance : mm; a level ends when no node moves farther in a step
+    tolerance : mm; the last level ends when no node moves farther in a step, the others at half a micrometre
+
+    Blurred pictures show less, and are compared at fewer points: one of 1 + blur².
     """
 
     levels: tuple[Level, ...]
@@ -127,9 +130,12 @@ class Solver:
     ) -> State:
         level = self.levels[number]
         freedom = freedom if level.moves != "shape" else held(freedom)
+        points = scene.points.thinned(1 + int(level.blur) ** 2) if level.blur >= 1 else scene.points
+        final = number == len(self.levels) - 1
+        tolerance = self.tolerance if final else max(self.tolerance, COARSE)
         last, factor = np.inf, 1.0
         for count in range(level.steps):
-            found = facets(scene, stack, state.views, state.deviation, state.weights, freedom.columns)
+            found = facets(scene, stack, state.views, state.deviation, state.weights, freedom.columns, points=points)
             if not np.isfinite(found.noise).any():
                 raise MeasurementError(
                     "The pictures show no grey levels that vary where the part should be: check that they are of this "
@@ -147,7 +153,7 @@ class Solver:
                 freedom.moved(state.views, factor * cameras),
                 robust(found),
                 (*state.steps, step),
-                change < self.tolerance,
+                change < tolerance,
             )
             if state.settled:
                 break
