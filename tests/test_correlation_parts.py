@@ -294,3 +294,14 @@ def test_a_view_that_moves_sees_what_a_part_that_moves_shows():
     points = np.random.default_rng(0).uniform(0, 40, (5, 3))
     moved = View(views[0].camera, views[0].camera_from_cad @ motion)
     assert moved.project(points) == pytest.approx(views[0].project(motion(points)))
+
+
+def test_points_near_the_outline_of_the_part_are_not_used(flat):
+    nominal, views, _ = flat
+    points = evaluation_points(nominal, np.full(len(nominal.mesh.triangles), 12))
+    used = visibility(nominal, points, views, STEEPEST, [None, None]).used
+    rim = np.concatenate([np.stack([np.linspace(0, 60, 500), np.full(500, y), np.zeros(500)], 1) for y in (0.0, 45.0)])
+    for view in views:
+        near, edge = view.project(points.places[used]), view.project(rim)
+        assert min(np.linalg.norm(edge - pixel, axis=1).min() for pixel in near) > 3.0
+    assert used.mean() > 0.9

@@ -84,19 +84,17 @@ class Correlate:
         pictures = Pictures(grey, self.interpolation)
         _require_sizes(pictures, views)
         _require_different(pictures)
-        seen = scene(
-            nominal,
-            views,
-            self.pixels,
-            np.radians(self.steepest),
-            masks or [None] * len(views),
-            self.per_edge,
-            self.lifted,
-        )
+        seen = self._scene(nominal, views, masks)
         known = Freedom("known", tuple(Lens() for _ in views), tuple(views), seen.centre)
         freedom = freedom or known
         levels = self.levels or (JOINT if freedom.unknowns else SHAPE)
-        state = Solver(levels)(seen, pictures, views, freedom, told=told)
+        coarse = levels[:-1] if freedom.unknowns else levels
+        state = Solver(coarse)(seen, pictures, views, freedom, told=told)
+        if freedom.unknowns:  # the cameras have moved, and with them the outline of the part in the pictures
+            deviation = np.zeros(len(nominal.mesh))
+            deviation[seen.node] = state.deviation
+            seen = self._scene(nominal, state.views, masks)
+            state = Solver(levels[-1:])(seen, pictures, state.views, freedom, deviation[seen.node], told)
         last = freedom if levels[-1].moves == "both" else held(freedom)
         stack = pictures.blurred(0.0)
         for _ in range(ROUNDS):
@@ -112,6 +110,10 @@ class Correlate:
         local = float(np.sqrt(np.median(sure.system.nodal.inverse_diagonal)))
         motions = hidden_motions(seen, sure.system, last, local)
         return Shape(nominal.mesh, seen, state, sure, motions, found)
+
+    def _scene(self, nominal: Nominal, views: Sequence[View], masks: Sequence[Booleans | None] | None) -> Scene:
+        masks = masks or [None] * len(views)
+        return scene(nominal, views, self.pixels, np.radians(self.steepest), masks, self.per_edge, self.lifted)
 
     def _good(self, found: Facets) -> Booleans:
         """Tell which facets agree between the pictures, (f,)."""

@@ -19,7 +19,7 @@ from inspect3d.correlation.scene import Scene
 from inspect3d.outcome import MeasurementError
 from inspect3d.register.mobility import spread
 
-SLOW, DAMPING, LEAST, PATIENCE = 0.7, 0.7, 0.25, 4
+SHORTER, LONGER, LEAST, PATIENCE = 0.5, 1.2, 0.02, 4
 COARSE = 5e-4
 Moves = Literal["cameras", "shape", "both"]
 
@@ -87,7 +87,10 @@ class Solver:
     levels : in their order
     tolerance : mm; the last level ends when no node moves farther in a step, the others at half a micrometre
 
-    Blurred pictures show less, and are compared at fewer points: one of 1 + blur².
+    After four steps of a level, one that turns back is halved, and so are the next until they go on: where the
+    pictures show a motion weakly, a full step goes too far and the next comes back. The robust weights of the facets
+    settle in the first steps of a level and are then kept, lest they take turns. Blurred pictures show less, and are
+    compared at fewer points: one of 1 + blur².
     """
 
     levels: tuple[Level, ...]
@@ -133,7 +136,7 @@ class Solver:
         points = scene.points.thinned(1 + int(level.blur) ** 2) if level.blur >= 1 else scene.points
         final = number == len(self.levels) - 1
         tolerance = self.tolerance if final else max(self.tolerance, COARSE)
-        last, factor = np.inf, 1.0
+        last, factor = np.zeros(len(scene.nodes)), 1.0
         for count in range(level.steps):
             found = facets(scene, stack, state.views, state.deviation, state.weights, freedom.columns, points=points)
             if not np.isfinite(found.noise).any():
@@ -144,20 +147,20 @@ class Solver:
             noise = noise_of(found, state.weights, len(scene.nodes))
             shape, cameras = _step(scene, found, noise, state, freedom, level)
             change = max(float(np.abs(shape).max()), _reach(scene, cameras, freedom) if level.moves == "cameras" else 0)
-            if count >= PATIENCE and change > SLOW * last:
-                factor = max(factor * DAMPING, LEAST)
+            if count >= PATIENCE:
+                factor = max(factor * SHORTER, LEAST) if shape @ last < 0 else min(factor * LONGER, 1.0)
             step = Step(number, change, float(np.sqrt(noise)))
             told(step)
             state = State(
                 state.deviation + factor * shape,
                 freedom.moved(state.views, factor * cameras),
-                robust(found),
+                robust(found) if count < PATIENCE else state.weights,
                 (*state.steps, step),
                 change < tolerance,
             )
             if state.settled:
                 break
-            last = change
+            last = shape
         return state
 
 
