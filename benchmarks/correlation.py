@@ -81,7 +81,7 @@ class Score:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("cases", nargs="+", choices=CASES)
+    parser.add_argument("cases", nargs="*", metavar="CASE", help=f"{', '.join(CASES)}; default: known")
     parser.add_argument("--runs", type=int, default=6)
     parser.add_argument("--full", action="store_true", help="5 megapixels in place of a quarter of that")
     parser.add_argument("--cameras", type=int, default=2)
@@ -90,7 +90,7 @@ def main() -> None:
     parser.add_argument("--steps", action="store_true", help="the paper's two steps in place of the joint solve")
     parser.add_argument("--flat", action="store_true", help="flat facets in place of lifted points")
     chosen = parser.parse_args()
-    for name in chosen.cases:
+    for name in chosen.cases or ["known"]:
         scores = _runs(CASES[name], chosen)
         z, rest = (np.concatenate([getattr(s, field) for s in scores]) for field in ("z", "rest_z"))
         weak = sum(s.weak for s in scores) / max(sum(s.modes for s in scores), 1)

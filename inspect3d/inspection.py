@@ -34,7 +34,7 @@ from inspect3d.register.register import Register
 from inspect3d.registry import build
 
 REFERENCE = 20.0  # degC at which dimensions hold (ISO 1)
-LIBRARIES = ("numpy", "scipy", "numba", "open3d", "pyvista", "trimesh", "pymeshlab", "cadquery-ocp-novtk")
+LIBRARIES = ("numpy", "scipy", "numba", "open3d", "pyvista", "pymeshlab", "cadquery-ocp-novtk")
 
 
 @dataclass(frozen=True, eq=False)

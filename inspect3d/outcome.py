@@ -39,7 +39,7 @@ class Status(StrEnum):
 
 _WORDS = {
     Status.OK: "The measured points fix the pose of the part completely.",
-    Status.SYMMETRIC: "The CAD model is symmetric: of the poses that are the same answer, the one nearest the start counts.",
+    Status.SYMMETRIC: "The CAD model is symmetric: of the equal poses the one nearest to the start was taken.",
     Status.FREE_MOTIONS: "The measured points leave some motions of the part free; they were held at the start.",
     Status.AMBIGUOUS: "Several different poses explain the measured points equally well; choose one in the recipe.",
     Status.FAILED: "There is no result.",

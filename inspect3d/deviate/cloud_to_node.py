@@ -39,7 +39,8 @@ class CloudToNode:
     by the mesh, and grows where they are few.
 
     The variance is s² times the first entry of (A'A)⁻¹, with s² pooled from the node's own scatter and the noise of
-    the cloud, which counts as `prior` further points.
+    the cloud, which counts as `prior` further points. A node that lies beyond the edge of the scan is not observed: an
+    extrapolated value is not a measured one.
 
     Parameters
     ----------
@@ -47,12 +48,14 @@ class CloudToNode:
     radius : least and largest radius, in edge lengths of the mesh
     grown : radius to which a node short of points may grow, in edge lengths
     prior : points that the noise of the whole cloud is worth at each node
+    unlike : a node whose points scatter so many times more than usual is not observed: they are not of one surface
     """
 
     wanted: int = 100
     radius: tuple[float, float] = (0.35, 0.75)
     grown: float = 1.2
     prior: float = 20.0
+    unlike: float = 6.0
 
     def __call__(self, mesh: InspectionMesh, feet: Feet, part: Booleans, noise: float | None = None) -> NodeFit:
         """Return the measured surface over the nodes.
@@ -82,8 +85,9 @@ class CloudToNode:
         radii = self._radii(mesh, keys, cell)
         value, factor, squares, freedom = fit_nodes(mesh.nodes, mesh.normals, radii, noise or 0.0, *grid)
         observed = np.isfinite(factor) & ~mesh.crease
-        if noise is None:
-            noise = _pooled(squares[observed], freedom[observed])
+        usual = _pooled(squares[observed], freedom[observed])
+        noise = noise or usual
+        observed &= squares <= (self.unlike * max(noise, usual)) ** 2 * np.maximum(freedom, 1)
         pooled = (self.prior * noise**2 + squares) / (self.prior + freedom)
         variance = np.where(observed, pooled * np.where(observed, factor, 1.0), np.nan)
         return NodeFit(np.where(observed, value, np.nan), variance, observed, noise)
@@ -98,10 +102,10 @@ class CloudToNode:
 
 
 def _pooled(squares: Floats, freedom: Floats) -> float:
-    """Return the usual scatter of a point, mm: the median over the nodes of their own, each a mean over its points."""
+    """Return the usual scatter of a point, mm: the median over the nodes of their own; 0 where no node has any."""
     told = freedom > 0
     if not told.any():
-        return float("nan")
+        return 0.0
     # the median of chi-square over its degrees of freedom is (1 - 2/(9 k))³ (Wilson & Hilferty 1931)
     share = (1 - 2 / (9 * freedom[told])) ** 3
     return float(np.sqrt(np.median(squares[told] / freedom[told] / share)))

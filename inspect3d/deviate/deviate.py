@@ -12,15 +12,14 @@ from inspect3d.deviate.deviation import Deviation
 from inspect3d.measure import Cloud
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.nominal.surface import Feet
-from inspect3d.outcome import MeasurementError, Status
+from inspect3d.outcome import MeasurementError
 from inspect3d.pose import Pose
 from inspect3d.register.alignment import Alignment
 from inspect3d.register.gauge import Gauge, best_fit
-from inspect3d.register.icp import MAD, TUKEY
-from inspect3d.register.mobility import jacobian, named
+from inspect3d.register.icp import TUKEY, median_and_scale
+from inspect3d.register.mobility import jacobian
 
 FOREIGN = 0.02  # share of the CAD's diagonal beyond which a point is foreign, unless the recipe gives a reach
-BLOCKS = 8  # cells along the diagonal within which errors may correlate
 SETTLED = 0.02  # share of the usual uncertainty below which the last motion of a node ends the alignment
 LEAST_NODES = 12
 
@@ -109,7 +108,7 @@ class Deviate:
         deviation = self._map(fit, value, gauge, alignments, nominal)
         distance = np.where(feet.on_rim, np.nan, feet.distance - self.coating)
         distance[np.abs(feet.distance) > (self.reach or np.inf)] = np.nan
-        placed = self._aligned(alignments, moved, gauge, value, clouds, distance)
+        placed = self._aligned(alignments, moved, clouds, distance)
         return CloudDeviation(deviation, placed, moved(points), distance, fit.noise, self._remarks(nominal, feet))
 
     def _remarks(self, nominal: Nominal, feet: Feet) -> tuple[str, ...]:
@@ -154,54 +153,30 @@ class Deviate:
         local = fit.variance[seen]
         coating = np.full(len(seen), self.coating_sigma)
         if self.refine:
-            value, variance = gauge(value), gauge.variances(local) + gauge(coating) ** 2
+            value = value + gauge.jacobian @ gauge.motion(value)
+            variance = gauge.variances(local) + gauge(coating) ** 2
         else:
             rows = jacobian(gauge.nodes, gauge.normals, alignments[0].origin)
             variance = local + np.einsum("ij,jk,ik->i", rows, alignments[0].covariance, rows) + coating**2
-        variance = variance + self.calibration**2 + nominal.chord**2 / 12
+        variance = variance + self.calibration**2 + nominal.chord**2 / 3
         full_value, full_sigma = np.full(len(fit.value), np.nan), np.full(len(fit.value), np.nan)
         full_value[seen], full_sigma[seen] = value, np.sqrt(variance)
         return Deviation(full_value, full_sigma, fit.observed)
 
     def _aligned(
-        self,
-        alignments: tuple[Alignment, ...],
-        moved: Pose,
-        gauge: Gauge,
-        value: Floats,
-        clouds: tuple[Cloud, ...],
-        distance: Floats,
+        self, alignments: tuple[Alignment, ...], moved: Pose, clouds: tuple[Cloud, ...], distance: Floats
     ) -> tuple[Alignment, ...]:
-        """Return the alignments with the last motion, and what the map says about them."""
-        if not self.refine:
-            return alignments
-        free = named(gauge.free, gauge.origin, gauge.length)
-        covariance = gauge.covariance(gauge(value), gauge.length * 2 / BLOCKS)
+        """Return the alignments with the last motion in them, and what the points say about it."""
         ends = np.cumsum([len(cloud) for cloud in clouds])
         result = []
         for alignment, cloud, end in zip(alignments, clouds, ends, strict=True):
             own = distance[end - len(cloud) : end]
-            told = own[np.isfinite(own)]
-            middle = np.median(told)
-            residual = float(MAD * np.median(np.abs(told - middle)))
-            used = np.isfinite(own) & (np.abs(own - middle) < TUKEY * max(residual, 1e-12))
-            result.append(
-                replace(
-                    alignment,
-                    cad_from_measured=moved @ alignment.cad_from_measured,
-                    residual=float(MAD * np.median(np.abs(own[used] - np.median(own[used])))),
-                    covariance=covariance,
-                    origin=gauge.origin,
-                    used=used,
-                    status=Status.FREE_MOTIONS if free else _without_freedom(alignment.status),
-                    free=free,
-                )
-            )
+            middle, scale = median_and_scale(own[np.isfinite(own)])
+            used = np.isfinite(own) & (np.abs(own - middle) < TUKEY * max(scale, 1e-12))
+            _, residual = median_and_scale(own[used])
+            pose = moved @ alignment.cad_from_measured
+            result.append(replace(alignment, cad_from_measured=pose, residual=residual, used=used))
         return tuple(result)
-
-
-def _without_freedom(status: Status) -> Status:
-    return Status.OK if status is Status.FREE_MOTIONS else status
 
 
 def _normals(clouds: tuple[Cloud, ...], alignments: tuple[Alignment, ...]) -> Floats:

@@ -17,6 +17,7 @@ ENOUGH = 15  # points that a quadratic polynomial wants
 LEAST = 6  # points below which a node is not observed
 REJECTED = 4.0  # scales at which a point is left out of the fit
 SAME_SIDE = 0.7  # cosine between the normals of node and foot
+AMIDST = 0.5  # radii by which the points' centre may lie off the node; on the straight edge of a scan it is 4 / (3 pi)
 MOST = 2000  # points used around a node; more are thinned evenly
 
 
@@ -202,6 +203,8 @@ def fit_nodes(
             columns[c, 0], columns[c, 1], columns[c, 2] = 1.0, u, v
             columns[c, 3], columns[c, 4], columns[c, 5] = u * u, u * v, v * v
             y[c] = distance[p]
+        if math.hypot(np.mean(columns[:, 1]), np.mean(columns[:, 2])) > AMIDST:
+            continue
         if count >= ENOUGH:
             value[i], factor[i], squares[i], freedom[i] = _fit(columns, y, noise, QUADRATIC)
         if not factor[i] <= 1.0:

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from inspect3d.arrays import Floats, Integers, floats, unit
+from inspect3d.arrays import Booleans, Floats, Integers, floats, unit
+from inspect3d.nominal.closest_parameters import closest_parameters
 
-_STEPS = 30
-"""Newton steps at most; three are usual from the guess of a fine tessellation."""
+_OWNED = 5e-7
+_COMPASS = np.stack([np.cos(np.arange(8) * np.pi / 4), np.sin(np.arange(8) * np.pi / 4)], axis=1)
+_HAIRS = (np.zeros(2), *(length * direction for length in (1e-5, 1e-3, 2e-2) for direction in _COMPASS))
+"""Steps in mm to try from a border, the shortest first."""
 
 
 @dataclass(frozen=True, eq=False)
 class Brep:
     """Exact faces and edges in mm, as OpenCASCADE holds them.
 
-    Faces and edges are numbered in the order of the file (`TopExp::MapShapes`): faces from 1, as a recipe names them, edges from 0.
+    Faces are numbered from 1 in the order of the file (`TopExp::MapShapes`), as a recipe names them; edges from 0.
 
     Parameters
     ----------
@@ -64,6 +67,14 @@ class Brep:
         BRepBndLib.Add_s(self.shape, box, False)
         return box.CornerMin().Distance(box.CornerMax())
 
+    def turned(self) -> Brep:
+        """Return the same part with inside and outside exchanged."""
+        from OCP.TopoDS import TopoDS
+
+        return replace(
+            self, shape=self.shape.Reversed(), faces=tuple(TopoDS.Face_s(face.Reversed()) for face in self.faces)
+        )
+
     def points_at(self, face: Integers, uv: Floats) -> Floats:
         """Return the points (n, 3) mm at the parameters uv (n, 2) of the faces numbered `face` (n,)."""
         return self._by_face(face, uv, _points)
@@ -79,9 +90,6 @@ class Brep:
     def project(self, points: Floats, face: Integers, guess: Floats | None = None) -> tuple[Floats, Floats]:
         """Return the closest points of given faces, disregarding their trimming, and their parameters.
 
-        Newton's method on the squared distance from a guess, with Gauss-Newton where the full Hessian is not positive definite
-        (beyond a centre of curvature).
-
         Parameters
         ----------
         points : (n, 3) mm
@@ -96,10 +104,10 @@ class Brep:
             guess = self._search(points, face)
         uv = np.array(guess, dtype=float)
         for number, members in _groups(face):
-            uv[members] = _closest_parameters(self.surfaces[number - 1], points[members], uv[members])
+            uv[members] = closest_parameters(self.surfaces[number - 1], points[members], uv[members])
         return self.points_at(face, uv), uv
 
-    def inside(self, face: Integers, uv: Floats) -> np.ndarray:
+    def inside(self, face: Integers, uv: Floats) -> Booleans:
         """Tell which parameters (n, 2) lie within the trimmed region of their face, its border included."""
         from OCP.BRepTopAdaptor import BRepTopAdaptor_FClass2d
         from OCP.gp import gp_Pnt2d
@@ -111,6 +119,25 @@ class Brep:
             states = [region.Perform(gp_Pnt2d(u, v)) for u, v in uv[members].tolist()]
             within[members] = [state != TopAbs_State.TopAbs_OUT for state in states]
         return within
+
+    def owned(self, face: int, uv: Floats) -> Floats:
+        """Return the point (3,) at the parameters uv (2,) on the border of a face, or one a hair within the face.
+
+        Where a face gapes from its edges, OpenCASCADE measures from a point on its border to the edge, not to the face.
+        """
+        from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
+        from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+        from OCP.gp import gp_Pnt, gp_Vec
+
+        surface, point, along_u, along_v = self.surfaces[face - 1], gp_Pnt(), gp_Vec(), gp_Vec()
+        surface.D1(uv[0], uv[1], point, along_u, along_v)
+        per_millimetre = 1.0 / np.maximum([along_u.Magnitude(), along_v.Magnitude()], 1e-12)
+        for step in _HAIRS:
+            near = surface.Value(*(uv + step * per_millimetre))
+            vertex = BRepBuilderAPI_MakeVertex(near).Vertex()
+            if BRepExtrema_DistShapeShape(vertex, self.faces[face - 1]).Value() < _OWNED:
+                return np.array(near.Coord())
+        return np.array(point.Coord())
 
     def _by_face(self, face: Integers, uv: Floats, evaluate: Callable[[Any, list], np.ndarray]) -> Floats:
         values = np.empty((len(uv), 3))
@@ -150,7 +177,7 @@ def _natural_normals(surface: Any, uv: Sequence[tuple[float, float]]) -> np.ndar
         surface.D1(u, v, point, along_u, along_v)
         row[0], row[1] = along_u.Coord(), along_v.Coord()
     normals = np.cross(unit(rows[:, 0]), unit(rows[:, 1]))
-    for pole in np.flatnonzero(np.linalg.norm(normals, axis=1) < 1e-6):
+    for pole in np.flatnonzero(np.linalg.norm(normals, axis=1) < 1e-6).tolist():
         normals[pole] = _limit_normal(surface, *uv[pole])
     return unit(normals)
 
@@ -165,73 +192,3 @@ def _limit_normal(surface: Any, u: float, v: float) -> tuple[float, float, float
     middle_v = (surface.FirstVParameter() + surface.LastVParameter()) / 2
     beside = BRepLProp_SLProps(surface, u + 1e-4 * (middle_u - u), v + 1e-4 * (middle_v - v), 2, 1e-12)
     return beside.Normal().Coord() if beside.IsNormalDefined() else (0.0, 0.0, 0.0)
-
-
-def _closest_parameters(surface: Any, points: Floats, guess: Floats) -> Floats:
-    """Minimise |S(u, v) - p| from the guess, for all points of one face at once; no step may lead away from the point."""
-    low, high = _bounds(surface)
-    longest = 0.1 * np.array([_span(surface, "U"), _span(surface, "V")])
-    best, uv = guess.copy(), guess.copy()
-    nearest = np.full(len(points), np.inf)
-    active = np.arange(len(points))
-    for _ in range(_STEPS):
-        at, s_u, s_v, s_uu, s_vv, s_uv = _second_order(surface, uv[active])
-        r = at - points[active]
-        distance = np.linalg.norm(r, axis=1)
-        closer = distance < nearest[active]
-        nearest[active] = np.where(closer, distance, nearest[active])
-        best[active] = np.where(closer[:, None], uv[active], best[active])
-        gradient = np.stack([_dot(r, s_u), _dot(r, s_v)], axis=1)
-        e, f, g = _dot(s_u, s_u), _dot(s_u, s_v), _dot(s_v, s_v)
-        a, b, c = e + _dot(r, s_uu), f + _dot(r, s_uv), g + _dot(r, s_vv)
-        convex = (a > 0) & (a * c - b * b > 1e-12 * e * g)
-        a, b, c = (np.where(convex, full, gauss) for full, gauss in ((a, e), (b, f), (c, g)))
-        step = np.clip(-_solved(a, b, c, gradient), -longest, longest)
-        halfway = (uv[active] + best[active]) / 2
-        moved = np.where(closer[:, None], np.clip(uv[active] + step, low, high), halfway)
-        change = np.abs(moved - best[active])
-        uv[active] = moved
-        active = active[np.sqrt(e) * change[:, 0] + np.sqrt(g) * change[:, 1] > 1e-10]
-        if not len(active):
-            break
-    return best
-
-
-def _span(surface: Any, letter: str) -> float:
-    first, last = (getattr(surface, f"{end}{letter}Parameter")() for end in ("First", "Last"))
-    return min(last - first, 1e6)
-
-
-def _bounds(surface: Any) -> tuple[Floats, Floats]:
-    """Return the limits of the parameters, open where the surface closes on itself."""
-    low = np.array([surface.FirstUParameter(), surface.FirstVParameter()])
-    high = np.array([surface.LastUParameter(), surface.LastVParameter()])
-    free = np.array([surface.IsUPeriodic(), surface.IsVPeriodic()])
-    return np.where(free, -np.inf, low), np.where(free, np.inf, high)
-
-
-def _second_order(surface: Any, uv: Floats) -> Floats:
-    from OCP.gp import gp_Pnt, gp_Vec
-
-    point = gp_Pnt()
-    s_u, s_v, s_uu, s_vv, s_uv = (gp_Vec() for _ in range(5))
-    rows = np.empty((len(uv), 18))
-    for row, (u, v) in zip(rows, uv.tolist(), strict=True):
-        surface.D2(u, v, point, s_u, s_v, s_uu, s_vv, s_uv)
-        row[:] = point.Coord() + s_u.Coord() + s_v.Coord() + s_uu.Coord() + s_vv.Coord() + s_uv.Coord()
-    return np.moveaxis(rows.reshape(-1, 6, 3), 1, 0)
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.einsum("ij,ij->i", a, b)
-
-
-def _solved(a: Floats, b: Floats, c: Floats, right: Floats) -> Floats:
-    """Solve [[a, b], [b, c]] x = right; where that is singular (a pole), each unknown by itself."""
-    determinant = a * c - b * b
-    regular = determinant > 1e-14 * a * c
-    safe = np.where(regular, determinant, 1.0)
-    both = np.stack([c * right[:, 0] - b * right[:, 1], a * right[:, 1] - b * right[:, 0]], axis=1) / safe[:, None]
-    diagonal = np.stack([a, c], axis=1)
-    single = np.where(diagonal > 0, right / np.where(diagonal > 0, diagonal, 1.0), 0.0)
-    return np.where(regular[:, None], both, single)

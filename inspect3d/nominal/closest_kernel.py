@@ -74,7 +74,7 @@ def _closest_in_turn(
         which = features.of_triangle[triangle[i], feature]
         nx, ny, nz = features.normals[which]
         on_rim[i] = features.rims[which]
-        if nx == 0 and ny == 0 and nz == 0:
+        if _doubtful(feature, on_rim[i], nx, ny, nz, vx, vy, vz, length, tree.packets[packet], lane):
             nx, ny, nz, on_rim[i] = gathered_normal(x - vx, y - vy, z - vz, tree, features)
         if nx == 0 and ny == 0 and nz == 0:
             nx, ny, nz = (vx / length, vy / length, vz / length) if length > 0 else (0.0, 0.0, 1.0)
@@ -114,3 +114,30 @@ def _foot(x: float, y: float, z: float, packet: Floats, lane: int) -> tuple[int,
         if square < least:
             least, feature, vx, vy, vz = square, candidate, px, py, pz
     return feature, vx, vy, vz
+
+
+@njit(cache=True)
+def _doubtful(
+    feature: int,
+    rim: bool,
+    nx: float,
+    ny: float,
+    nz: float,
+    vx: float,
+    vy: float,
+    vz: float,
+    length: float,
+    packet: Floats,
+    lane: int,
+) -> bool:
+    """Tell whether a pseudo-normal N is missing, or cannot belong to a foot with the vector v to the point.
+
+    From a foot on an edge, v lies between the normals of the two faces, so no farther from N than they are. Otherwise
+    the foot lies on another edge: at the tip of a needle two of them are equally near for all that rounding can tell.
+    """
+    if nx == 0 and ny == 0 and nz == 0:
+        return True
+    if feature == 0 or feature > 3 or rim:
+        return False
+    spread = nx * packet[9, lane] + ny * packet[10, lane] + nz * packet[11, lane]
+    return abs(nx * vx + ny * vy + nz * vz) < (spread - 1e-6) * length

@@ -12,10 +12,10 @@ _AXES = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1
 
 
 def closest_facing(surface: Surface, points: Floats, normals: Floats) -> tuple[Floats, Integers]:
-    """Return the closest points (n, 3) mm among triangles that do not look away from the normals (n, 3), and their triangles (n,).
+    """Return the closest points (n, 3) mm on triangles that look the way of normals (n, 3), and the triangles (n,).
 
-    A triangle may look up to 63 degrees away for certain and up to 117 degrees at most. Where there is no such triangle the closest
-    point of all is taken.
+    The closest point of all will do if its triangle is less than 90 degrees off. Otherwise those within 62 degrees
+    are searched, and of those up to 118 degrees off some.
     """
     feet = surface.closest(points)
     found, triangle = feet.points.copy(), feet.triangle.copy()

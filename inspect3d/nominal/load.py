@@ -6,16 +6,20 @@ from pathlib import Path
 
 import numpy as np
 
+from inspect3d.nominal.brep import Brep
 from inspect3d.nominal.inspection_mesh import mesh_on_brep, mesh_on_surface
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.nominal.repair import repaired
 from inspect3d.nominal.step_iges import IGES_SUFFIXES, STEP_SUFFIXES, read_brep
 from inspect3d.nominal.surface import Surface
-from inspect3d.nominal.tessellation import tessellated
+from inspect3d.nominal.tessellation import Tessellation, tessellated
 from inspect3d.outcome import InputError
 
 _ELEMENTS_PER_DIAGONAL = 60
 _CHORD_PER_DIAGONAL = 1e-5
+_CHORDS_PER_ELEMENT = 50
+_FEW_TRIANGLES, _MOST_TRIANGLES = 60_000, 2_000_000
+_FINER = 8.0  # by which a surface of few triangles is made finer: the number grows in proportion at the most
 _MILLIMETRES = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "inch": 25.4, "ft": 304.8}
 
 
@@ -52,12 +56,42 @@ def load_nominal(
 
 def _exact(path: Path, name: str, element_size: float | None, flip: bool) -> Nominal:
     brep = read_brep(path)
-    rough = tessellated(brep, 1e-3 * brep.diagonal)
-    size = element_size or _default_size(rough.vertices)
-    mesh = mesh_on_brep(tessellated(brep, min(1e-4 * brep.diagonal, size / 50)), size)
-    chord = _CHORD_PER_DIAGONAL * brep.diagonal
-    fine = tessellated(brep, chord)
-    return Nominal(name, Surface(fine.vertices, fine.triangles), mesh, chord, (), brep)
+    fine = _fine(brep)
+    is_open = not Surface(fine.vertices, fine.triangles).closed
+    if flip and is_open:
+        brep = brep.turned()
+        fine = _fine(brep)
+    surface = Surface(fine.vertices, fine.triangles)
+    size = element_size or surface.diagonal / _ELEMENTS_PER_DIAGONAL
+    mesh, remarks = mesh_on_brep(tessellated(brep, size / _CHORDS_PER_ELEMENT), size)
+    remarks += _remarks_on(brep, fine, is_open, flip)
+    return Nominal(name, surface, mesh, fine.chord, remarks, brep, fine.face)
+
+
+def _fine(brep: Brep) -> Tessellation:
+    """Return a tessellation fine enough to stand for the exact surface, but not of unwieldy size."""
+    deflection = _CHORD_PER_DIAGONAL * brep.diagonal
+    fine = tessellated(brep, deflection)
+    if len(fine.triangles) < _FEW_TRIANGLES:
+        return tessellated(brep, deflection / _FINER)
+    while len(fine.triangles) > _MOST_TRIANGLES:
+        deflection *= 2 * len(fine.triangles) / _MOST_TRIANGLES
+        fine = tessellated(brep, deflection)
+    return fine
+
+
+def _remarks_on(brep: Brep, fine: Tessellation, is_open: bool, flip: bool) -> tuple[str, ...]:
+    remarks = []
+    missing = np.setdiff1d(np.arange(1, len(brep.faces) + 1), fine.face)
+    if len(missing):
+        numbers = ", ".join(map(str, missing[:10])) + (" and others" if len(missing) > 10 else "")
+        remarks.append(f"{len(missing)} of {len(brep.faces)} faces cannot be triangulated and are missing: {numbers}.")
+    if is_open:
+        side = "turned by the recipe's flip" if flip else "taken from the file; flip = true turns it"
+        remarks.append(f"The model is open, a sheet and not a solid; its outside is {side}.")
+    elif flip:
+        remarks.append("The model is closed, so its outside is known and flip = true did nothing.")
+    return tuple(remarks)
 
 
 def _triangulated(path: Path, name: str, units: str, element_size: float | None, flip: bool) -> Nominal:
@@ -66,13 +100,8 @@ def _triangulated(path: Path, name: str, units: str, element_size: float | None,
     if units not in _MILLIMETRES:
         raise InputError(f"{units} is no unit of length here; use one of mm, cm, m, um, inch.")
     found = read_mesh(path)
-    vertices, triangles, remarks = repaired(
-        path.name, found.vertices * _MILLIMETRES[found.units or units], found.triangles, flip
-    )
-    surface = Surface(vertices, triangles)
-    mesh = mesh_on_surface(surface, element_size or _default_size(vertices))
-    return Nominal(name, surface, mesh, 0.0, (*found.remarks, *remarks))
-
-
-def _default_size(vertices: np.ndarray) -> float:
-    return float(np.linalg.norm(np.ptp(vertices, axis=0))) / _ELEMENTS_PER_DIAGONAL
+    millimetres = _MILLIMETRES[found.units or units]
+    mended = repaired(path.name, found.vertices * millimetres, found.triangles, flip)
+    surface = Surface(mended.vertices, mended.triangles)
+    mesh, remarks = mesh_on_surface(surface, element_size or surface.diagonal / _ELEMENTS_PER_DIAGONAL)
+    return Nominal(name, surface, mesh, 0.0, (*found.remarks, *mended.remarks, *remarks))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -49,6 +50,10 @@ class InspectionMesh:
         third = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
         return np.bincount(self.triangles.ravel(), np.repeat(third, 3), minlength=len(self.nodes)).astype(np.float64)
 
+    def nodes_of(self, faces: Iterable[int]) -> Integers:
+        """Return the nodes that the B-rep faces with the given numbers own."""
+        return np.flatnonzero(np.isin(self.face, list(faces)))
+
     @cached_property
     def edge_length(self) -> float:
         """Return the median length of the edges, mm."""
@@ -68,6 +73,7 @@ class Nominal:
     chord : largest distance between `surface` and the exact surface, mm; 0 where the mesh is the model
     remarks : what was repaired or assumed, a sentence each
     exact : the B-rep, where there is one (see `inspect3d.nominal.brep`)
+    surface_face : (m,) number of the B-rep face each triangle of `surface` lies on, where there is one
     """
 
     name: str
@@ -76,6 +82,12 @@ class Nominal:
     chord: float = 0.0
     remarks: tuple[str, ...] = ()
     exact: object | None = None
+    surface_face: Integers | None = None
+
+    def __post_init__(self) -> None:
+        if self.surface_face is not None:
+            faces = integers(self.surface_face, "surface_face", len(self.surface.triangles))
+            object.__setattr__(self, "surface_face", faces)
 
     @property
     def diagonal(self) -> float:

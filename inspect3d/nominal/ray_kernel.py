@@ -9,6 +9,7 @@ from inspect3d.arrays import Floats, Integers
 from inspect3d.nominal.bvh import BRANCH, LANES, STACK, Tree
 
 BATCH = 512
+ENDLESS = 1e300
 
 
 @njit(cache=True, parallel=True)
@@ -26,41 +27,49 @@ def first_hit(
     distance, triangle : (n,), written: infinity and -1 where nothing is met
     """
     for batch in prange((len(origins) + BATCH - 1) // BATCH):
-        stack, lengths, ray = np.empty(STACK, dtype=np.int64), np.empty(LANES), np.empty((3, 3))
+        stack, bounds, lengths = np.empty(STACK, dtype=np.int64), np.empty(STACK), np.empty(LANES)
+        ray = np.empty((3, 3))
         for i in range(batch * BATCH, min((batch + 1) * BATCH, len(origins))):
             for axis in range(3):
                 along = directions[i, axis]
                 ray[0, axis] = origins[i, axis] - tree.origin[axis]
                 ray[1, axis] = along
                 ray[2, axis] = 1.0 / (along if abs(along) > 1e-150 else 1e-150)
-            distance[i], triangle[i] = _first(ray, reaches[i], tree, stack, lengths)
+            distance[i], triangle[i] = _first(ray, reaches[i], tree, stack, bounds, lengths)
 
 
 @njit(cache=True)
-def _first(ray: Floats, reach: float, tree: Tree, stack: Integers, lengths: Floats) -> tuple[float, int]:
+def _first(
+    ray: Floats, reach: float, tree: Tree, stack: Integers, bounds: Floats, lengths: Floats
+) -> tuple[float, int]:
     """Return length and triangle of the first hit of a ray: its origin, direction, and one over that."""
-    links = tree.links
-    least, triangle = reach, -1
-    stack[0] = 0
+    boxes, links = tree.boxes, tree.links
+    least, triangle = min(reach, ENDLESS), -1
+    stack[0], bounds[0] = 0, box_entry(ray, boxes, 0)
     waiting = 1
     while waiting > 0:
         waiting -= 1
+        if bounds[waiting] > least:
+            continue
         node = stack[waiting]
-        if box_entry(ray, tree.boxes, node) > least:
-            continue
-        if links[node, 0] == BRANCH:
+        while links[node, 0] == BRANCH:
             near, far = links[node, 1], links[node, 1] + 1
-            if box_entry(ray, tree.boxes, far) < box_entry(ray, tree.boxes, near):
-                near, far = far, near
-            stack[waiting], stack[waiting + 1] = far, near
-            waiting += 2
-            continue
-        packet = links[node, 1]
-        write_lengths(ray, tree.packets[packet], tree.packets.shape[2], lengths)
-        for lane in range(LANES):
-            member, length = tree.members[packet, lane], lengths[lane]
-            if length < least or (length == least and length < np.inf and (triangle < 0 or member < triangle)):
-                least, triangle = length, member
+            near_bound, far_bound = box_entry(ray, boxes, near), box_entry(ray, boxes, far)
+            if far_bound < near_bound:
+                near, far, near_bound, far_bound = far, near, far_bound, near_bound
+            if near_bound > least:
+                break
+            if far_bound <= least:
+                stack[waiting], bounds[waiting] = far, far_bound
+                waiting += 1
+            node = near
+        else:
+            packet = links[node, 1]
+            write_lengths(ray, tree.packets[packet], tree.packets.shape[2], lengths)
+            for lane in range(LANES):
+                member, length = tree.members[packet, lane], lengths[lane]
+                if length < least or (length == least and (triangle < 0 or member < triangle)):
+                    least, triangle = length, member
     return least if triangle >= 0 else np.inf, triangle
 
 

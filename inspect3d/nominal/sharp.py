@@ -24,7 +24,7 @@ class Sides(NamedTuple):
     angle: Floats
 
     def sharp(self, angle: float) -> Integers:
-        """Return the ends (l, 2) of the sides with facets farther apart than `angle` rad, or without exactly two facets."""
+        """Return the ends (l, 2) of sides whose facets are farther apart than `angle` rad or not exactly two."""
         return self.ends[(self.angle > angle) | (self.uses != 2)]
 
 
@@ -61,7 +61,8 @@ class OnLine(NamedTuple):
 def nearest_on_segments(points: Floats, start: Floats, end: Floats, spacing: float) -> OnLine:
     """Return the nearest points of segments from `start` to `end`, both (k, 3) mm, to points (n, 3) mm.
 
-    Segments are found by samples about `spacing` mm apart: nearer than that, the nearest segment may be missed by a share of it.
+    Segments are found by samples about `spacing` mm apart: the one found may be farther than the nearest by a share of
+    that.
     """
     from scipy.spatial import cKDTree
 

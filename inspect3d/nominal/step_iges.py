@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from inspect3d.nominal.brep import Brep
+from inspect3d.nominal.sewing import sewn
 from inspect3d.outcome import InputError
 
 STEP_SUFFIXES = frozenset({".step", ".stp"})
@@ -17,7 +18,8 @@ IGES_SUFFIXES = frozenset({".iges", ".igs"})
 def read_brep(path: Path) -> Brep:
     """Return the faces of a STEP or IGES file in mm; the unit is the file's own.
 
-    Assemblies come with every part in its place. The faces of an IGES file, which know nothing of each other, are sewn where they meet.
+    Assemblies come with every part in its place. The faces of an IGES file, which know nothing of each other, are sewn
+    where they meet.
 
     Raises
     ------
@@ -30,39 +32,33 @@ def read_brep(path: Path) -> Brep:
     else:
         _require_iges(path)
     shape = _transferred(path, is_step)
-    if shape.IsNull() or not _mapped(shape, "face"):
-        raise InputError(
-            f"{path.name} holds no faces (perhaps only curves or points); export the part as a solid or as surfaces."
-        )
-    return brep_of(shape if is_step else _sewn(shape))
+    faces = [] if shape.IsNull() else _mapped(shape, "face")
+    if not faces:
+        raise InputError(f"{path.name} holds no faces, perhaps only curves; export the part as a solid or as surfaces.")
+    part = brep_of(shape, faces)
+    return part if is_step else brep_of(*sewn(shape, faces, part.diagonal))
 
 
-def brep_of(shape: Any) -> Brep:
-    """Return the faces and edges of a `TopoDS_Shape` in mm, numbered in its order."""
+def brep_of(shape: Any, faces: list[Any]) -> Brep:
+    """Return the faces of a `TopoDS_Shape` in mm, numbered as they come, and its edges."""
     from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopExp import TopExp
     from OCP.TopoDS import TopoDS
     from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape, TopTools_IndexedMapOfShape
 
-    faces_of_edge = TopTools_IndexedDataMapOfShapeListOfShape()
-    TopExp.MapShapesAndUniqueAncestors_s(
-        shape, TopAbs_ShapeEnum.TopAbs_EDGE, TopAbs_ShapeEnum.TopAbs_FACE, faces_of_edge
-    )
+    beside = TopTools_IndexedDataMapOfShapeListOfShape()
+    kinds = TopAbs_ShapeEnum.TopAbs_EDGE, TopAbs_ShapeEnum.TopAbs_FACE
+    TopExp.MapShapesAndUniqueAncestors_s(shape, *kinds, beside)
     numbers = TopTools_IndexedMapOfShape()
-    TopExp.MapShapes_s(shape, TopAbs_ShapeEnum.TopAbs_FACE, numbers)
+    for face in faces:
+        numbers.Add(face)
     edges = [TopoDS.Edge_s(edge) for edge in _mapped(shape, "edge")]
-    beside = [
-        tuple(sorted(numbers.FindIndex(face) for face in faces_of_edge.FindFromKey(edge)))
-        if faces_of_edge.Contains(edge)
-        else ()
-        for edge in edges
-    ]
     return Brep(
         shape=shape,
-        faces=tuple(TopoDS.Face_s(face) for face in _mapped(shape, "face")),
+        faces=tuple(TopoDS.Face_s(face) for face in faces),
         edges=tuple(edges),
-        edge_faces=tuple(beside),
+        edge_faces=tuple(tuple(sorted(map(numbers.FindIndex, beside.FindFromKey(edge)))) for edge in edges),
         edge_tolerance=np.array([BRep_Tool.Tolerance_s(edge) for edge in edges]),
     )
 
@@ -82,23 +78,19 @@ def _require_step(path: Path) -> None:
     if b"ISO-10303-21" not in text[:1024]:
         raise InputError(f"{path.name} is not a STEP file: it does not begin with ISO-10303-21.")
     if b"END-ISO-10303-21" not in text[-1024:] or b"ENDSEC" not in text:
-        raise InputError(
-            f"{path.name} is cut off: its closing line END-ISO-10303-21 is missing; export or copy it again."
-        )
+        raise InputError(f"{path.name} is cut off: its last line END-ISO-10303-21 is missing; export or copy it again.")
 
 
 def _require_iges(path: Path) -> None:
-    """Check the five sections: column 73 of every 80-column line names its section, the last line counts their lines."""
+    """Check the sections: column 73 of each 80-column line names its section, and the last line counts their lines."""
     lines = [line for line in path.read_bytes().splitlines() if line.strip()]
     sections = "".join(chr(line[72]) if len(line) > 72 else "?" for line in lines)
-    if not sections.startswith("S") or "G" not in sections[:100]:
+    if not sections.startswith("S") or "G" not in sections:
         raise InputError(f"{path.name} is not an IGES file in the fixed 80-column form.")
     counts = lines[-1].decode("ascii", "replace")
     announced = {counts[k]: counts[k + 1 : k + 8].strip() for k in range(0, 32, 8)} if sections.endswith("T") else {}
-    if any(announced.get(letter) != str(sections.count(letter)) for letter in "SGDP"):
-        raise InputError(
-            f"{path.name} is cut off or damaged: its last line does not count its lines; export or copy it again."
-        )
+    if any(announced.get(letter, "").lstrip("0") != str(sections.count(letter)) for letter in "SGDP"):
+        raise InputError(f"{path.name} is cut off: its last line does not count the others; export or copy it again.")
 
 
 def _transferred(path: Path, is_step: bool) -> Any:
@@ -121,16 +113,3 @@ def _silence() -> None:
     messenger = Message.DefaultMessenger_s()
     for printer in list(messenger.Printers()):
         messenger.RemovePrinter(printer)
-
-
-def _sewn(shape: Any) -> Any:
-    from OCP.Bnd import Bnd_Box
-    from OCP.BRepBndLib import BRepBndLib
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
-
-    box = Bnd_Box()
-    BRepBndLib.Add_s(shape, box)
-    sewing = BRepBuilderAPI_Sewing(max(1e-6, 1e-5 * box.CornerMin().Distance(box.CornerMax())))
-    sewing.Load(shape)
-    sewing.Perform()
-    return sewing.SewedShape()

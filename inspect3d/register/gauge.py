@@ -13,6 +13,8 @@ from inspect3d.register.mobility import jacobian, spread
 MAD = 1.4826
 TUKEY = 4.685
 FREE = 1e-3  # share of the stiffest motion's stiffness below which a motion is free
+SOFT = 1e-2  # share of the stiffest motion's stiffness below which a motion is soft
+OFFSET = 3.0  # robust scales that a uniform deviation must have to count as one
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,11 +27,13 @@ class Gauge:
     ----------
     nodes, normals : (n, 3) of the observed nodes, mm
     weights : (n,) W, area times robust weight
+    offset : mm, uniform deviation that no rigid motion explains; 0 unless it is far larger than the other deviations
     """
 
     nodes: Floats
     normals: Floats
     weights: Floats
+    offset: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", floats(self.weights, "weights", len(self.nodes)))
@@ -69,9 +73,12 @@ class Gauge:
     @cached_property
     def inverse(self) -> Floats:
         """Return (J' W J)⁺, (6, 6), with the free directions left out."""
+        return self._inverse(FREE)
+
+    def _inverse(self, least: float) -> Floats:
         values, vectors = self._spectrum
-        held = values >= FREE * values[-1]
-        return (vectors[:, held] / values[held]) @ vectors[:, held].T
+        stiff = values >= least * values[-1]
+        return (vectors[:, stiff] / values[stiff]) @ vectors[:, stiff].T
 
     @cached_property
     def solver(self) -> Floats:
@@ -79,8 +86,13 @@ class Gauge:
         return self.inverse @ (self.jacobian * self.weights[:, None]).T
 
     def motion(self, values: Floats) -> Floats:
-        """Return the small motion (6,) of the measured points that best undoes a deviation field (n,) mm."""
-        return -self.solver @ values
+        """Return the small motion (6,) of the measured points that best undoes a deviation field (n,) mm.
+
+        A part that is too large all over, as a ring of too large a diameter, would lean over to fit the better: the
+        `offset` it has left when the stiff motions are made does not count for the soft ones.
+        """
+        soft = self.inverse - self._inverse(SOFT)
+        return -self.solver @ values + self.offset * soft @ (self.jacobian.T @ self.weights)
 
     def __call__(self, values: Floats) -> Floats:
         """Return G v: fields (n,) or (n, k) without their rigid motion."""
@@ -133,7 +145,14 @@ def best_fit(nodes: Floats, normals: Floats, areas: Floats, values: Floats, step
         remains = Gauge(nodes, normals, weights)(values)
         if settled:
             break
-    return Gauge(nodes, normals, weights)
+    return Gauge(nodes, normals, weights, _offset(remains, areas))
+
+
+def _offset(values: Floats, areas: Floats) -> float:
+    """Return the median of values (n,) mm, or 0 where it does not stand out of their scatter."""
+    middle = _weighted_median(values, areas)
+    scatter = MAD * _weighted_median(np.abs(values - middle), areas)
+    return middle if abs(middle) > OFFSET * scatter else 0.0
 
 
 def _weighted_median(values: Floats, weights: Floats) -> float:

@@ -15,6 +15,7 @@ from inspect3d.system import import_open3d
 MAD = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 TUKEY = 4.685  # scales at which Tukey's biweight rejects: 95 % efficient for normal noise
 OPPOSED = 0.2
+LEANING = 1.5  # robust scales that the median distance must have to be called an offset
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,33 +54,51 @@ class RobustIcp:
     steps : at the most
     still : share of the robust scale below which the largest motion of a point ends the iteration
     first_width : half width of the kernel in the first step, mm; None starts at the noise
-    least_scale : the scale is not taken smaller than this, mm
+    offset : mm, distance from the surface that the points are brought to
     """
 
     steps: int = 60
     still: float = 1e-3
     first_width: float | None = None
-    least_scale: float = 1e-6
+    offset: float = 0.0
 
     def __call__(self, cloud: Thinned, surface: Surface, start: Pose) -> Fit:
         """Return the fit that the iteration from `start` (cad_from_cloud) ends in."""
         pose, width = start, self.first_width or np.inf
         for _ in range(self.steps):
-            fit = fitted(cloud, surface, pose, self.least_scale)
-            width = max(min(0.7 * width, width), TUKEY * fit.scale) if np.isfinite(width) else TUKEY * fit.scale
-            part = fit.agrees & ~fit.feet.on_rim & (np.abs(fit.feet.distance) < width)
+            fit = fitted(cloud, surface, pose)
+            valid = fit.agrees & ~fit.feet.on_rim
+            distance = np.abs(fit.feet.distance - self.offset)
+            scale = MAD * float(np.median(distance[valid])) if valid.any() else fit.scale
+            width = max(0.7 * width, TUKEY * scale) if np.isfinite(width) else TUKEY * scale
+            part = valid & (distance < width)
             if np.count_nonzero(part) < 6:
                 return fit
-            points = pose(cloud.points[part])
-            motion = step(points, fit.feet.points[part], fit.feet.normals[part], width)
+            points, normals = pose(cloud.points[part]), fit.feet.normals[part]
+            motion = step(points, fit.feet.points[part] + self.offset * normals, normals, width)
             pose = motion @ pose
             moved = np.abs(motion(points) - points).max()
-            if moved < self.still * fit.scale and width <= 1.01 * TUKEY * fit.scale:
+            if moved < self.still * scale and width <= 1.01 * TUKEY * scale:
                 break
-        return fitted(cloud, surface, pose, self.least_scale)
+        return fitted(cloud, surface, pose)
 
 
-def fitted(cloud: Thinned, surface: Surface, pose: Pose, least_scale: float = 0.0) -> Fit:
+def settled(cloud: Thinned, surface: Surface, start: Pose) -> Fit:
+    """Return the fit of robust ICP from a start near the end, uniform offsets considered.
+
+    A part that is too large all over, as a ring of too large a diameter, leans over to lie closer to the CAD. If the
+    distances stand out from zero in the first fit, the points are brought to their median instead, and so twice again.
+    """
+    fit = RobustIcp(still=0.01)(cloud, surface, start)
+    for _ in range(3):
+        middle, scatter = median_and_scale(fit.feet.distance[fit.agrees & ~fit.feet.on_rim])
+        if abs(middle) < LEANING * scatter:
+            break
+        fit = RobustIcp(still=0.01, offset=middle)(cloud, surface, fit.pose)
+    return fit
+
+
+def fitted(cloud: Thinned, surface: Surface, pose: Pose) -> Fit:
     """Return how the points lie on the surface in a given pose."""
     feet = surface.closest(pose(cloud.points))
     cosine = np.einsum("ni,ni->n", pose.turned(cloud.normals), feet.normals)
@@ -87,7 +106,7 @@ def fitted(cloud: Thinned, surface: Surface, pose: Pose, least_scale: float = 0.
     agrees = ~told | ((cosine if cloud.oriented else np.abs(cosine)) > OPPOSED)
     part = agrees & ~feet.on_rim
     distance = np.abs(feet.distance[part]) if part.any() else np.array([surface.diagonal])
-    return Fit(pose, feet, agrees, max(float(MAD * np.median(distance)), least_scale))
+    return Fit(pose, feet, agrees, float(MAD * np.median(distance)))
 
 
 def step(points: Floats, feet: Floats, normals: Floats, width: float) -> Pose:
@@ -115,3 +134,9 @@ def _anchors(length: float) -> tuple[Floats, Floats]:
     pairs = [(side * length * axes[k], axes[j]) for k in range(3) for j in range(3) if j != k for side in (1.0, -1.0)]
     places, directions = zip(*pairs, strict=True)
     return np.array(places), np.array(directions)
+
+
+def median_and_scale(distances: Floats) -> tuple[float, float]:
+    """Return the median of distances (n,) and 1.4826 times the median absolute deviation about it, mm."""
+    middle = float(np.median(distances))
+    return middle, float(MAD * np.median(np.abs(distances - middle)))

@@ -60,7 +60,7 @@ def _sparse(shifts: Floats) -> Floats:
 
 def _shift(motion: Floats) -> FreeMotion:
     direction = _signed(unit(motion[3:]))
-    return FreeMotion(f"shift along {_vector(direction, 3)}", np.concatenate([np.zeros(3), direction]))
+    return FreeMotion(f"shift along {_vector(direction, 2)}", np.concatenate([np.zeros(3), direction]))
 
 
 def _turn(scaled: Floats, origin: Floats, length: float) -> FreeMotion:
@@ -70,7 +70,7 @@ def _turn(scaled: Floats, origin: Floats, length: float) -> FreeMotion:
     translation = translation / speed * np.sign(axis @ rotation)
     foot = origin + np.cross(axis, translation)
     foot = foot - (foot @ axis) * axis  # the point of the axis nearest to the CAD's origin
-    where = f"about the axis along {_vector(axis, 3)} through {_vector(foot, 1)} mm"
+    where = f"about the axis along {_vector(axis, 2)} through {_vector(foot, 1)} mm"
     pitch = float(axis @ translation)
     if abs(pitch) < SMALL * length:
         return FreeMotion(f"turn {where}", np.concatenate([axis, translation - pitch * axis]))

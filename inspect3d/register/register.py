@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 
-from inspect3d.arrays import Floats
 from inspect3d.measure import Cloud
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import Status
@@ -17,7 +16,7 @@ from inspect3d.register.blind import BlindStart
 from inspect3d.register.choice import Choice, free_in
 from inspect3d.register.field import Field
 from inspect3d.register.gauge import Gauge
-from inspect3d.register.icp import MAD, TUKEY, Fit, RobustIcp, fitted
+from inspect3d.register.icp import TUKEY, Fit, RobustIcp, fitted, median_and_scale, settled
 from inspect3d.register.mobility import named, spread
 from inspect3d.register.smooth import Smooth
 from inspect3d.register.thinned import Thinned, thinned
@@ -149,15 +148,15 @@ class Register:
         """Return the pose the alignment from a given start ends in, or the start itself."""
         if not self.refine:
             return start
-        many = thinned(cloud, MANY)
+        many = thinned(cloud, MANY, even=False)
         width = min(0.05 * self.nominal.diagonal, self.reach or np.inf)
         rough = RobustIcp(first_width=width)(many.every(max(len(many.points) // FEW, 1)), self.nominal.surface, start)
-        fit = RobustIcp()(many, self.nominal.surface, rough.pose)
+        fit = settled(many, self.nominal.surface, rough.pose)
         self._require_fit(cloud, fit, many, ())
         return fit.pose
 
     def _fine(self, cloud: Cloud, start: Pose) -> Pose:
-        return RobustIcp(still=0.01)(thinned(cloud, MANY), self.nominal.surface, start).pose
+        return settled(thinned(cloud, MANY, even=False), self.nominal.surface, start).pose
 
     @staticmethod
     def _status(choice: Choice) -> Status:
@@ -185,19 +184,14 @@ class Register:
         return Alignment(
             cad_from_measured=pose @ to_centre,
             scale=1.0,
-            residual=robust_scale(distance[used]),
-            covariance=gauge.covariance(distance[part], block) if self.refine else np.zeros((6, 6)),
+            residual=median_and_scale(distance[used])[1],
+            covariance=gauge.covariance(gauge(distance[part]), block) if self.refine else np.zeros((6, 6)),
             origin=gauge.origin,
             used=used,
             status=Status.FREE_MOTIONS if free else status,
             free=free,
             candidates=candidates,
         )
-
-
-def robust_scale(values: Floats) -> float:
-    """Return 1.4826 times the median absolute deviation of values (n,) about their median."""
-    return float(MAD * np.median(np.abs(values - np.median(values))))
 
 
 def _candidates(choice: Choice, to_centre: Pose) -> tuple[Candidate, ...]:

@@ -40,16 +40,17 @@ class Thinned:
         return Thinned(self.points * factor, self.normals, self.oriented, self.noise * factor)
 
 
-def thinned(cloud: Cloud, count: int, seed: int = 0) -> Thinned:
-    """Return about `count` evenly spread points of the cloud, with normals.
+def thinned(cloud: Cloud, count: int, even: bool = True, seed: int = 0) -> Thinned:
+    """Return about `count` points of the cloud, with normals.
 
-    Space is divided into cells, and the point nearest to the mean of each well-filled cell is taken; normals are the
-    direction of least scatter of the 16 nearest points, signed by the cloud's own normals where it has them.
+    Even: space is divided into cells, and the point nearest to the mean of each well-filled cell is taken. Otherwise
+    they are drawn at random, as dense as the cloud. Normals are the direction of least scatter of the 16 nearest
+    points, signed by the cloud's own normals where it has them.
     """
     points = cloud.points
-    keep = _one_per_cell(points, count)
-    chosen = points[keep]
     random = np.random.default_rng(seed)
+    keep = _one_per_cell(points, count) if even else random.permutation(len(points))[:count]
+    chosen = points[keep]
     crowd = points if len(points) <= 200_000 else points[random.choice(len(points), 200_000, replace=False)]
     crowd_normals = None
     if cloud.normals is not None and len(points) <= 200_000:

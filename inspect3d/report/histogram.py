@@ -87,7 +87,7 @@ def _span(limits: Interval, tolerance: Interval | None, figures: Statistics) -> 
     inner = (max(figures.min, figures.mean - spread), min(figures.max, figures.mean + spread))
     if (inner[1] - inner[0]) * 6 > high - low:
         return (low, high)
-    margin = 0.15 * (inner[1] - inner[0]) or 0.1 * (high - low)
+    margin = max(0.15 * (inner[1] - inner[0]), 0.01 * (high - low))
     return (inner[0] - margin, inner[1] + margin)
 
 

@@ -74,10 +74,8 @@ def _of_the_points(record: Record, part: MeasuredPart) -> list[Contribution]:
         found.append(Contribution("alignment", _micro(float(np.median(sigma))), words))
     if record.nominal.chord > 0:
         chord = record.nominal.chord
-        words = (
-            f"the triangles that stand for the CAD surface lie up to {_micro(chord)} off it; rectangular distribution"
-        )
-        found.append(Contribution("CAD tessellation", _micro(chord / np.sqrt(12.0)), words))
+        words = f"the triangles that stand for the CAD surface lie up to {_micro(chord)} off it, on one side"
+        found.append(Contribution("CAD tessellation", _micro(chord / np.sqrt(3.0)), words))
     return found
 
 

@@ -1,0 +1,205 @@
+"""The edges of a tessellated B-rep: which are sharp, where their corners lie, and exact places on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from inspect3d.arrays import Booleans, Floats, Integers, unit
+from inspect3d.nominal.brep import Brep
+from inspect3d.nominal.remeshing import FEATURE_ANGLE
+from inspect3d.nominal.sharp import corners_of_lines, sides_of
+from inspect3d.nominal.tessellation import Tessellation
+
+_GAPE = 5e-7
+"""A border that may gape by more than this, mm, leaves doubt who owns its nodes."""
+
+
+class Placed(NamedTuple):
+    """Nodes on the exact part.
+
+    Parameters
+    ----------
+    points : (n, 3) mm
+    normals : (n, 3), unit
+    face : (n,) number of the face that owns the node
+    crease : (n,) faces around the node are more than 30 degrees apart
+    """
+
+    points: Floats
+    normals: Floats
+    face: Integers
+    crease: Booleans
+
+
+class _OnEdges(NamedTuple):
+    """Places on edges: their owners, the parameters there, the mean normals, and whether the faces make a crease."""
+
+    face: Integers
+    uv: Floats
+    normals: Floats
+    crease: Booleans
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """The pieces of the edges of a tessellated B-rep.
+
+    Parameters
+    ----------
+    tessellation : of the part, or of one body of it
+    """
+
+    tessellation: Tessellation
+
+    @cached_property
+    def sharp(self) -> Integers:
+        """Return the segments where faces meet at more than 30 degrees or end."""
+        mesh = self.tessellation
+        segment = np.arange(len(mesh.segments))
+        start, end = self.ends(segment)
+        sides = sides_of(mesh.vertices, mesh.triangles)
+        rims = sides.ends[sides.uses != 2] @ (len(mesh.vertices), 1)
+        is_rim = np.isin(np.sort(mesh.segments, axis=1) @ (len(mesh.vertices), 1), rims)
+        halfway = np.full(len(segment), 0.5)
+        return np.flatnonzero(is_rim | self._on_edges(segment, halfway, (start + end) / 2).crease)
+
+    @cached_property
+    def corners(self) -> Integers:
+        """Return the vertices where sharp lines end, branch or turn, and the tips of cones."""
+        lines = self.tessellation.segments[self.sharp]
+        corner = corners_of_lines(self.tessellation.vertices, lines, FEATURE_ANGLE)
+        tip = self._folded.copy()
+        tip[lines.ravel()] = False
+        return np.flatnonzero(corner | tip)
+
+    def ends(self, segment: Integers | slice) -> tuple[Floats, Floats]:
+        """Return the ends (k, 3) mm of segments."""
+        pieces = self.tessellation.segments[segment]
+        return self.tessellation.vertices[pieces[:, 0]], self.tessellation.vertices[pieces[:, 1]]
+
+    def at_vertices(self, vertex: Integers) -> Placed:
+        """Return the exact places of vertices, on the face of the lowest number there."""
+        mesh = self.tessellation
+        last_first = np.argsort(-mesh.face, kind="stable")
+        owner = np.zeros((len(mesh.vertices), 2), dtype=np.int64)
+        corners = np.stack([np.repeat(last_first, 3), np.tile(np.arange(3), len(last_first))], axis=1)
+        owner[mesh.triangles[last_first].ravel()] = corners
+        triangle, corner = owner[vertex].T
+        face = mesh.face[triangle]
+        uv = mesh.uv[triangle, corner]
+        points = mesh.brep.points_at(face, uv)
+        gape = np.linalg.norm(points - mesh.vertices[vertex], axis=1)
+        _own(mesh.brep, points, face, uv, gape > _GAPE)
+        return Placed(points, self._vertex_normals[vertex], face, self._folded[vertex])
+
+    def at_segments(self, segment: Integers, share: Floats, nodes: Floats) -> Placed:
+        """Return the exact points of edges nearest to nodes (k, 3) mm, on their faces of the lowest number.
+
+        Parameters
+        ----------
+        segment : (k,) near the node
+        share : (k,) how far along it, to start from
+        """
+        on_edges = self._on_edges(segment, share, nodes)
+        brep, face, uv = self.tessellation.brep, on_edges.face, on_edges.uv
+        points = brep.points_at(face, uv)
+        _own(brep, points, face, uv, brep.edge_tolerance[self.tessellation.segment_edge[segment]] > _GAPE)
+        return Placed(points, on_edges.normals, face, on_edges.crease)
+
+    def across(self, segment: Integers, face: Integers) -> Integers:
+        """Return the number of the face on the other side of segments, (k,); at a rim the same one."""
+        beside = (self.tessellation.brep.edge_faces[e] for e in self.tessellation.segment_edge[segment].tolist())
+        pairs = zip(beside, face.tolist(), strict=True)
+        return np.array([next((b for b in faces if b != own), faces[0]) for faces, own in pairs], dtype=np.int64)
+
+    def parameters(self, segment: Integers, share: Floats, face: Integers) -> Floats:
+        """Return where points of segments lie in the parameters of a face beside them, (k, 2)."""
+        return self._uv(self.tessellation.segment_edge[segment], face, self._t(segment, share))
+
+    def _on_edges(self, segment: Integers, share: Floats, nodes: Floats) -> _OnEdges:
+        brep = self.tessellation.brep
+        edge = self.tessellation.segment_edge[segment]
+        rows = zip(edge.tolist(), self._t(segment, share).tolist(), nodes, strict=True)
+        t = np.array([_closest_on_curve(brep.curves[e], start, point) for e, start, point in rows])
+        face = np.array([brep.edge_faces[e][0] for e in edge.tolist()], dtype=np.int64)
+        last = np.array([brep.edge_faces[e][-1] for e in edge.tolist()], dtype=np.int64)
+        uv = self._uv(edge, face, t)
+        one, other = brep.normals_at(face, uv), brep.normals_at(last, self._uv(edge, last, t))
+        both = unit(one + other)
+        normals = np.where(both.any(axis=1, keepdims=True), both, one)
+        return _OnEdges(face, uv, normals, (one * other).sum(axis=1) < np.cos(FEATURE_ANGLE))
+
+    @cached_property
+    def _curves(self) -> dict[tuple[int, int], Any]:
+        return {}
+
+    @cached_property
+    def _corner_normals(self) -> Floats:
+        mesh = self.tessellation
+        return mesh.brep.normals_at(np.repeat(mesh.face, 3), mesh.uv.reshape(-1, 2)).reshape(-1, 3, 3)
+
+    @cached_property
+    def _vertex_normals(self) -> Floats:
+        """Return the exact normals of the faces around each vertex, weighted by their angles there, (n, 3)."""
+        mesh = self.tessellation
+        corners = mesh.vertices[mesh.triangles]
+        ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+        angle = np.arctan2(np.linalg.norm(np.cross(ahead, behind), axis=2), (ahead * behind).sum(axis=2))
+        weighted = (self._corner_normals * angle[:, :, None]).reshape(-1, 3)
+        at, n = mesh.triangles.ravel(), len(mesh.vertices)
+        return unit(np.stack([np.bincount(at, weighted[:, k], minlength=n) for k in range(3)], axis=1))
+
+    @cached_property
+    def _folded(self) -> Booleans:
+        """Tell around which vertices (n,) faces are more than 30 degrees apart: one is half of that off their mean."""
+        triangles = self.tessellation.triangles
+        agreement = (self._corner_normals * self._vertex_normals[triangles]).sum(axis=2)
+        least = np.ones(len(self.tessellation.vertices))
+        np.minimum.at(least, triangles.ravel(), agreement.ravel())
+        return least < np.cos(FEATURE_ANGLE / 2)
+
+    def _t(self, segment: Integers, share: Floats) -> Floats:
+        ends = self.tessellation.segment_t[segment]
+        return ends[:, 0] + share * (ends[:, 1] - ends[:, 0])
+
+    def _uv(self, edge: Integers, face: Integers, t: Floats) -> Floats:
+        rows = zip(edge.tolist(), face.tolist(), t.tolist(), strict=True)
+        return np.array([self._curve_on(e, f).Value(at).Coord() for e, f, at in rows]).reshape(-1, 2)
+
+    def _curve_on(self, edge: int, face: int) -> Any:
+        from OCP.BRepAdaptor import BRepAdaptor_Curve2d
+
+        if (edge, face) not in self._curves:
+            brep = self.tessellation.brep
+            self._curves[edge, face] = BRepAdaptor_Curve2d(brep.edges[edge], brep.faces[face - 1])
+        return self._curves[edge, face]
+
+
+def _own(brep: Brep, points: Floats, face: Integers, uv: Floats, doubtful: Booleans) -> None:
+    """Move the doubtful points of borders a hair into their faces, where needed."""
+    for k in np.flatnonzero(doubtful).tolist():
+        points[k] = brep.owned(int(face[k]), uv[k])
+
+
+def _closest_on_curve(curve: Any, start: float, point: Floats) -> float:
+    """Minimise |C(t) - p| from a start by Newton's method, within the ends of the curve."""
+    from OCP.gp import gp_Pnt, gp_Vec
+
+    at, first, second = gp_Pnt(), gp_Vec(), gp_Vec()
+    low, high = curve.FirstParameter(), curve.LastParameter()
+    t = start
+    for _ in range(10):
+        curve.D2(t, at, first, second)
+        r, speed = np.array(at.Coord()) - point, np.array(first.Coord())
+        speed2 = speed @ speed
+        if speed2 == 0:
+            break
+        curvature = speed2 + r @ np.array(second.Coord())
+        t, before = min(max(t - (r @ speed) / (curvature if curvature > 0 else speed2), low), high), t
+        if abs(t - before) * np.sqrt(speed2) < 1e-10:
+            break
+    return t

@@ -1,0 +1,178 @@
+"""From a recipe to the results on disk: the contract, the verdicts, the uncertainty, and what goes wrong."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inspect3d.inspection import check, inspect, run
+from inspect3d.outcome import InputError, Status
+from inspect3d.progress import Progress
+from inspect3d.recipe import load_recipe
+from inspect3d.register.gauge import best_fit
+from inspect3d.virtual.truth import Truth
+
+ROOT = Path(__file__).parents[1]
+BRACKET = ROOT / "datasets" / "bracket"
+CHECKER = ROOT.parent / "shared" / "tools" / "check_contract.py"
+
+
+def recipe(folder, part="", measurement="", rest=""):
+    """Write a recipe for the bracket and return its path."""
+    text = f"""
+schema = 1
+[part]
+name = "Bracket"
+cad = {json.dumps(str(BRACKET / "part.step"))}
+element_size = 4.0
+{part}
+[[measurements]]
+name = "laser"
+method = "scan"
+{measurement or "files = [" + json.dumps(str(BRACKET / "scan.ply")) + "]"}
+{rest}
+"""
+    (folder / "recipe.toml").write_text(text, encoding="utf-8")
+    return folder / "recipe.toml"
+
+
+@pytest.fixture(scope="module")
+def bracket(tmp_path_factory):
+    """The bracket inspected once, with its results."""
+    out = tmp_path_factory.mktemp("bracket") / "out"
+    return run(BRACKET / "recipe.toml", out), out
+
+
+def test_the_results_keep_the_contract(bracket):
+    if not CHECKER.exists():
+        pytest.skip("the contract's checker is not beside the repository")
+    checked = subprocess.run(
+        [sys.executable, str(CHECKER), str(bracket[1])], capture_output=True, text=True, check=False
+    )
+    assert checked.returncode == 0, checked.stdout
+
+
+def test_the_demo_tells_the_truth(bracket):
+    record, _ = bracket
+    part, mesh = record.parts[0], record.nominal.mesh
+    seen = part.deviation.observed
+    truth = Truth.read(BRACKET / "truth.json").deviation(mesh.nodes[seen])
+    gauge = best_fit(mesh.nodes[seen], mesh.normals[seen], mesh.areas[seen], part.deviation.value[seen])
+    z = (part.deviation.value[seen] - gauge(truth)) / part.deviation.sigma[seen]
+    assert part.status is Status.OK
+    assert 0.9 < np.sqrt(np.mean(z**2)) < 1.1
+    assert 0.93 < np.mean(np.abs(z) < 1.96) < 0.97
+
+
+def test_the_demo_finds_its_bump_and_little_else_out_of_tolerance(bracket):
+    record, _ = bracket
+    part, mesh = record.parts[0], record.nominal.mesh
+    failed = mesh.nodes[part.verdict == 3]
+    assert len(failed) > 10
+    assert np.median(np.linalg.norm(failed - np.median(failed, axis=0), axis=1)) < 8
+
+
+def test_inputs_are_hashed_and_relative(bracket):
+    values = json.loads((bracket[1] / "results.json").read_text(encoding="utf-8"))
+    assert {item["path"] for item in values["inputs"]} == {"recipe.toml", "part.step", "scan.ply"}
+
+
+def one(path):
+    """Return how the only measurement of a recipe ended."""
+    return inspect(load_recipe(path), Progress()).parts[0]
+
+
+def test_a_given_pose_that_is_not_refined_is_kept(tmp_path):
+    rows = Truth.read(BRACKET / "truth.json").cad_from_scan.matrix.tolist()
+    scan = f"files = [{json.dumps(str(BRACKET / 'scan.ply'))}]\n"
+    path = recipe(tmp_path, measurement=scan + f'alignment = {{ start = "pose", matrix = {rows}, refine = false }}')
+    part = one(path)
+    np.testing.assert_allclose(part.alignments[0].cad_from_measured.matrix, rows, atol=1e-9)
+    assert part.deviation.observed.any()
+
+
+def test_excluded_boxes_are_neither_measured_nor_judged(tmp_path):
+    path = recipe(tmp_path, "tolerance = [-0.1, 0.1]\nexclude = [ { box = [[30, 40, -1], [50, 60, 30]] } ]")
+    record = inspect(load_recipe(path), Progress())
+    part, nodes = record.parts[0], record.nominal.mesh.nodes
+    inside = ((nodes > [30, 40, -1]) & (nodes < [50, 60, 30])).all(axis=1)
+    assert inside.any()
+    assert not part.deviation.observed[inside].any()
+    assert not (part.verdict[inside] > 0).any()
+
+
+def test_a_warm_part_is_measured_as_at_twenty_degrees(tmp_path):
+    cold = one(recipe(tmp_path))
+    path = recipe(tmp_path, rest="[report]\nbudget = { temperature = 30.0, expansion = 24e-6 }")
+    warm = one(path)
+    assert any("20 °C" in remark for remark in warm.remarks)
+    size_cold, size_warm = (np.ptp(np.percentile(p.points_cad, [5, 95], axis=0), axis=0) for p in (cold, warm))
+    np.testing.assert_allclose(size_cold / size_warm, 1 + 24e-5, atol=5e-5)
+
+
+def test_files_aligned_separately_have_an_alignment_each(tmp_path):
+    scan = json.dumps(str(BRACKET / "scan.ply"))
+    path = recipe(tmp_path, measurement=f'files = [{scan}, {scan}]\nframes = "separate"')
+    assert len(one(path).alignments) == 2
+
+
+def test_pdf_and_sections_are_warned_of(tmp_path):
+    rest = '[report]\nformats = ["html", "pdf"]\nsections = [ { point = [0, 0, 0], normal = [0, 1, 0] } ]'
+    record = inspect(load_recipe(recipe(tmp_path, rest=rest)), Progress())
+    assert ["PDF" in record.warnings[0], "sections" in record.warnings[1]] == [True, True]
+
+
+def test_check_reads_everything_and_measures_nothing(tmp_path):
+    lines = check(recipe(tmp_path))
+    assert any("59394" in line.replace(" ", "") for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("text", "status", "words"),
+    [
+        ("", 2, "empty"),
+        ("1 2 3\n4 5 6\n7 8 9\n", 1, "3 points"),
+        ("nan nan nan\n" * 50, 2, "points"),
+    ],
+)
+def test_clouds_with_nothing_in_them_end_in_a_sentence(tmp_path, text, status, words):
+    (tmp_path / "scan.xyz").write_text(text, encoding="utf-8")
+    path = recipe(tmp_path, measurement='files = ["scan.xyz"]')
+    ended = subprocess.run(
+        [sys.executable, "-m", "inspect3d", "run", str(path), "-o", str(tmp_path / "out")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == status, ended.stderr
+    told = ended.stderr if status == 2 else ended.stdout
+    assert words in told
+    assert "Traceback" not in ended.stderr
+    assert (tmp_path / "out").exists() == (status == 1)
+
+
+def test_an_interrupted_run_leaves_the_earlier_results_and_nothing_half_written(tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "results.json").write_text("{}", encoding="utf-8")
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("inspect3d.report.write.write_report", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run(recipe(tmp_path), out)
+    assert (out / "results.json").read_text(encoding="utf-8") == "{}"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "recipe.toml"]
+
+
+def test_a_folder_that_holds_something_else_is_not_replaced(tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "thesis.txt").write_text("years of work", encoding="utf-8")
+    with pytest.raises(InputError, match="not a folder of results"):
+        run(recipe(tmp_path), out)
+    assert (out / "thesis.txt").exists()
