@@ -147,7 +147,7 @@ def screenshot(
 
 @app.command()
 def virtual(
-    name: Annotated[str, typer.Argument(help="bracket, freeform or milled.")],
+    name: Annotated[str, typer.Argument(help="bracket, smooth-stereo, ... or a plan.toml of your own.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the data set.")],
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")] = 0,
 ) -> None:

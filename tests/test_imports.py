@@ -13,7 +13,19 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 PIPELINE = (
-    {"__init__", "arrays", "outcome", "pose", "camera", "progress", "terminal", "system", "readable", "file_name"},
+    {
+        "__init__",
+        "arrays",
+        "outcome",
+        "pose",
+        "camera",
+        "camera_kernel",
+        "progress",
+        "terminal",
+        "system",
+        "readable",
+        "file_name",
+    },
     {"files"},
     {"nominal"},
     {"measure"},

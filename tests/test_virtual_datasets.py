@@ -10,7 +10,7 @@ import pytest
 
 from inspect3d.outcome import InputError
 from inspect3d.recipe import Recipe
-from inspect3d.virtual.datasets import DATASETS, make_dataset
+from inspect3d.virtual.datasets import SCANNED, make_dataset
 from inspect3d.virtual.part_surface import PartSurface
 from inspect3d.virtual.truth import Truth
 
@@ -20,7 +20,7 @@ COMMITTED = Path(__file__).parents[1] / "datasets" / "bracket"
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("made")
-    return folder, {name: make_dataset(name, folder / name) for name in DATASETS}
+    return folder, {name: make_dataset(name, folder / name) for name in SCANNED}
 
 
 def cloud(path):
@@ -29,7 +29,7 @@ def cloud(path):
     return np.frombuffer(data, "<f4").reshape(-1, 3).astype(np.float64)
 
 
-@pytest.mark.parametrize("name", DATASETS)
+@pytest.mark.parametrize("name", SCANNED)
 def test_a_dataset_carries_a_recipe_that_names_its_files(name, made):
     folder = made[0] / name
     recipe = Recipe.model_validate(tomllib.loads((folder / "recipe.toml").read_text(encoding="utf-8")))
@@ -39,19 +39,19 @@ def test_a_dataset_carries_a_recipe_that_names_its_files(name, made):
     assert table["noise"] == made[1][name].noise
 
 
-@pytest.mark.parametrize("name", DATASETS)
+@pytest.mark.parametrize("name", SCANNED)
 def test_the_truth_moves_the_cloud_onto_the_true_part(name, made):
     truth = Truth.read(made[0] / name / "truth.json")
     points = truth.cad_from_scan(cloud(made[0] / name / "scan.ply"))
     own = np.delete(points, truth.foreign, axis=0)
-    fine = PartSurface.of_shape(DATASETS[name](0).part.shape(), chord=1e-3, chord_inside=2e-3)
+    fine = PartSurface.of_shape(SCANNED[name](0).part.shape(), chord=1e-3, chord_inside=2e-3)
     feet = fine.triangulation.closest(own[::7])
     inside = ~feet.on_rim
     error = feet.distance[inside] - truth.deviation(feet.points[inside])
     assert np.median(np.abs(error)) * 1.4826 == pytest.approx(truth.noise, rel=0.1)
 
 
-@pytest.mark.parametrize("name", DATASETS)
+@pytest.mark.parametrize("name", SCANNED)
 def test_a_truth_survives_its_file(name, made):
     written, read = made[1][name], Truth.read(made[0] / name / "truth.json")
     assert read.deviation == written.deviation

@@ -45,7 +45,7 @@ def _first(
     """Return length and triangle of the first hit of a ray: its origin, direction, and one over that."""
     boxes, links = tree.boxes, tree.links
     least, triangle = min(reach, ENDLESS), -1
-    stack[0], bounds[0] = 0, _entry(ray, boxes, 0)
+    stack[0], bounds[0] = 0, box_entry(ray, boxes, 0)
     waiting = 1
     while waiting > 0:
         waiting -= 1
@@ -54,7 +54,7 @@ def _first(
         node = stack[waiting]
         while links[node, 0] == BRANCH:
             near, far = links[node, 1], links[node, 1] + 1
-            near_bound, far_bound = _entry(ray, boxes, near), _entry(ray, boxes, far)
+            near_bound, far_bound = box_entry(ray, boxes, near), box_entry(ray, boxes, far)
             if far_bound < near_bound:
                 near, far, near_bound, far_bound = far, near, far_bound, near_bound
             if near_bound > least:
@@ -65,7 +65,7 @@ def _first(
             node = near
         else:
             packet = links[node, 1]
-            _write_lengths(ray, tree.packets[packet], tree.packets.shape[2], lengths)
+            write_lengths(ray, tree.packets[packet], tree.packets.shape[2], lengths)
             for lane in range(LANES):
                 member, length = tree.members[packet, lane], lengths[lane]
                 if length < least or (length == least and (triangle < 0 or member < triangle)):
@@ -74,7 +74,7 @@ def _first(
 
 
 @njit(cache=True)
-def _entry(ray: Floats, boxes: Floats, node: int) -> float:
+def box_entry(ray: Floats, boxes: Floats, node: int) -> float:
     """Return how far along a ray a box begins, infinity where it is missed."""
     enter, leave = 0.0, np.inf
     for axis in range(3):
@@ -85,7 +85,7 @@ def _entry(ray: Floats, boxes: Floats, node: int) -> float:
 
 
 @njit(cache=True)
-def _write_lengths(ray: Floats, packet: Floats, lanes: int, lengths: Floats) -> None:
+def write_lengths(ray: Floats, packet: Floats, lanes: int, lengths: Floats) -> None:
     """Write how far along a ray the triangles of a packet are met, infinity where they are missed, all lanes at once.
 
     Notes

@@ -32,23 +32,22 @@ class Dataset:
     scanner: LaserScanner
     recipe: str
 
+    def write(self, folder: Path, seed: int) -> Truth:
+        """Measure, and write part.step, scan.ply, truth.json and recipe.toml into a folder; existing ones are replaced.
 
-def write_dataset(dataset: Dataset, folder: Path, seed: int) -> Truth:
-    """Measure, and write part.step, scan.ply, truth.json and recipe.toml into a folder; existing ones are replaced.
-
-    Raises
-    ------
-    InputError
-        The folder cannot be written.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        scan = dataset.scanner(dataset.part.surface(), dataset.deviation, seed)
-        truth = Truth(dataset.deviation, scan.scan_from_cad, scan.noise, np.flatnonzero(scan.foreign), seed)
-        write_ply(folder / "scan.ply", scan.points_scan)
-        truth.write(folder / "truth.json")
-        (folder / "recipe.toml").write_text(dataset.recipe, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{folder} cannot be written: {error.strerror}. Choose another folder.") from error
-    dataset.part.write_step(folder / "part.step")
-    return truth
+        Raises
+        ------
+        InputError
+            The folder cannot be written.
+        """
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            scan = self.scanner(self.part.surface(), self.deviation, seed)
+            truth = Truth(self.deviation, scan.scan_from_cad, scan.noise, np.flatnonzero(scan.foreign), seed)
+            write_ply(folder / "scan.ply", scan.points_scan)
+            truth.write(folder / "truth.json")
+            (folder / "recipe.toml").write_text(self.recipe, encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"{folder} cannot be written: {error.strerror}. Choose another folder.") from error
+        self.part.write_step(folder / "part.step")
+        return truth

@@ -10,12 +10,16 @@ import numpy as np
 
 from inspect3d.outcome import InputError
 from inspect3d.virtual.bracket import bracket
-from inspect3d.virtual.dataset import Dataset, write_dataset
+from inspect3d.virtual.dataset import Dataset
 from inspect3d.virtual.deviation_field import Bump, FacetErrors, Scallops, Step, Sum, Wave, Within
 from inspect3d.virtual.freeform import FreeformSizes, freeform, freeform_patch
 from inspect3d.virtual.laser_scanner import LaserScanner
 from inspect3d.virtual.milled import MilledSizes, milled
+from inspect3d.virtual.picture_dataset import PictureDataset
+from inspect3d.virtual.picture_truth import PictureTruth
+from inspect3d.virtual.plan import load_plan
 from inspect3d.virtual.random_pose import random_pose
+from inspect3d.virtual.stereo_datasets import PHOTOGRAPHED
 from inspect3d.virtual.truth import Truth
 
 AROUND = ((0.25, 0.1, 1.0), (1.0, 0.3, 0.6), (0.2, 1.0, 0.7), (0.2, -1.0, 0.7), (-1.0, -0.2, 0.5))
@@ -84,21 +88,26 @@ noise = 0.02                     # mm, standard noise of a point
 """
 
 
-def make_dataset(name: str, folder: Path, seed: int = 0) -> Truth:
-    """Make one of `DATASETS` and write it into a folder.
+def make_dataset(name: str, folder: Path, seed: int = 0) -> Truth | PictureTruth:
+    """Make one of `DATASETS`, or what a plan asks for, and write it into a folder.
 
     Parameters
     ----------
-    seed : of the pose and of the scan; the same seed gives the same files
+    name : of a dataset, or the path of a plan, a TOML file; see `load_plan`
+    seed : of everything random; the same seed gives the same files
 
     Raises
     ------
     InputError
-        There is no dataset of that name, or the folder cannot be written.
+        There is no dataset of that name, the plan is wrong, or the folder cannot be written.
     """
+    if name.endswith(".toml"):
+        return load_plan(Path(name), seed).write(folder, seed)
     if name not in DATASETS:
-        raise InputError(f"There is no virtual dataset {name!r}; choose one of {', '.join(DATASETS)}.")
-    return write_dataset(DATASETS[name](seed), folder, seed)
+        raise InputError(
+            f"There is no virtual dataset {name!r}; choose one of {', '.join(DATASETS)}, or give a plan.toml."
+        )
+    return DATASETS[name](seed).write(folder, seed)
 
 
 def _bracket(seed: int) -> Dataset:
@@ -159,6 +168,7 @@ def _milled(seed: int) -> Dataset:
     return Dataset(milled(sizes), Within(mismatch + facets + scallops, low, high), scanner, MILLED_RECIPE)
 
 
-DATASETS: Mapping[str, Callable[[int], Dataset]] = MappingProxyType(
+SCANNED: Mapping[str, Callable[[int], Dataset]] = MappingProxyType(
     {"bracket": _bracket, "freeform": _freeform, "milled": _milled}
 )
+DATASETS: Mapping[str, Callable[[int], Dataset | PictureDataset]] = MappingProxyType({**SCANNED, **PHOTOGRAPHED})

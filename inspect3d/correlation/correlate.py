@@ -1,0 +1,156 @@
+"""Mesh-based stereocorrelation from pictures to the shape at every node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from inspect3d.arrays import Booleans, Floats
+from inspect3d.camera import View
+from inspect3d.correlation.freedom import Freedom, Lens
+from inspect3d.correlation.hidden import hidden_motions
+from inspect3d.correlation.normal import Facets, facets
+from inspect3d.correlation.picture import Interpolation, Pictures, Stack
+from inspect3d.correlation.scene import Scene, scene
+from inspect3d.correlation.shape import Shape
+from inspect3d.correlation.solver import Level, Solver, State, Step, held
+from inspect3d.correlation.uncertainty import Systematic, uncertainty
+from inspect3d.nominal.nominal import Nominal
+from inspect3d.outcome import MeasurementError
+
+SHAPE = (Level(6, 1000, 8, "shape"), Level(3, 100, 8, "shape"), Level(1.5, 1, 8, "shape"), Level(0, 0, 20, "shape"))
+CAMERAS = tuple(Level(blur, 0, 15, "cameras") for blur in (6.0, 3.0, 1.5))
+JOINT = (*CAMERAS, Level(3, 1, 8), Level(1.5, 0.1, 8), Level(0, 0, 40))
+TWO_STEPS = (*CAMERAS, Level(0, 0, 20, "cameras"), *SHAPE)
+"""Ways from coarse to fine: shape alone, cameras and shape together, and the paper's two steps."""
+
+NOISY = 25.0
+STEEPEST_TILT = 0.2
+ENOUGH = 0.3
+ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class Correlate:
+    """Settings of stereocorrelation.
+
+    Parameters
+    ----------
+    levels : the way from coarse to fine; none: `SHAPE` where the cameras are known, else `JOINT`
+    pixels : px of the largest picture that one evaluation point stands for
+    per_edge : evaluation points along the edge of every facet, in place of `pixels`; the paper has 6
+    interpolation : of the pictures between their pixels; the paper has "linear"
+    lifted : evaluation points on the nominal surface; else on flat facets as in the paper, wrong by the chord
+    steepest : degrees, largest angle between a normal and the line of sight
+    poorest : least correlation coefficient of a facet that counts
+    systematic : a smooth systematic shift of the pictures, carried into the uncertainty
+    """
+
+    levels: tuple[Level, ...] | None = None
+    pixels: float = 2.5
+    per_edge: int | None = None
+    interpolation: Interpolation = "cubic"
+    lifted: bool = True
+    steepest: float = 65.0
+    poorest: float = 0.7
+    systematic: Systematic | None = None
+
+    def __call__(
+        self,
+        nominal: Nominal,
+        grey: Sequence[Floats],
+        views: Sequence[View],
+        freedom: Freedom | None = None,
+        masks: Sequence[Booleans | None] | None = None,
+        told: Callable[[Step], None] = lambda step: None,
+    ) -> Shape:
+        """Return the shape that the pictures show.
+
+        Parameters
+        ----------
+        grey : of each view its picture (rows, columns), grey levels
+        views : the cameras, or where to start them
+        freedom : what is not known about the cameras; none: they are known
+        masks : of each view, True where its picture may be used, or None
+        told : called after each step
+
+        Raises
+        ------
+        MeasurementError
+            The pictures do not show the part, or not twice, or disagree all over.
+        """
+        pictures = Pictures(grey, self.interpolation)
+        _require_sizes(pictures, views)
+        _require_different(pictures)
+        seen = self._scene(nominal, views, masks)
+        known = Freedom("known", tuple(Lens() for _ in views), tuple(views), seen.centre)
+        freedom = freedom or known
+        levels = self.levels or (JOINT if freedom.unknowns else SHAPE)
+        coarse = levels[:-1] if freedom.unknowns else levels
+        state = Solver(coarse)(seen, pictures, views, freedom, told=told)
+        if freedom.unknowns:  # the cameras have moved, and with them the outline of the part in the pictures
+            deviation = np.zeros(len(nominal.mesh))
+            deviation[seen.node] = state.deviation
+            seen = self._scene(nominal, state.views, masks)
+            state = Solver(levels[-1:])(seen, pictures, state.views, freedom, deviation[seen.node], told)
+        last = freedom if levels[-1].moves == "both" else held(freedom)
+        stack = pictures.blurred(0.0)
+        for _ in range(ROUNDS):
+            found = _found(seen, stack, state, last)
+            good = self._good(found) & (seen.tilt(state.deviation) <= STEEPEST_TILT)
+            if good.all():
+                break
+            _require_some(good, found)
+            seen, node = seen.restricted(good)
+            state = Solver(levels[-1:])(seen, pictures, state.views, freedom, state.deviation[node], told)
+        found = _found(seen, stack, state, last)
+        sure = uncertainty(seen, stack, state.views, state.deviation, state.weights, last, self.systematic)
+        local = float(np.sqrt(np.median(sure.system.nodal.inverse_diagonal)))
+        motions = hidden_motions(seen, sure.system, last, local)
+        return Shape(nominal.mesh, seen, state, sure, motions, found)
+
+    def _scene(self, nominal: Nominal, views: Sequence[View], masks: Sequence[Booleans | None] | None) -> Scene:
+        masks = masks or [None] * len(views)
+        return scene(nominal, views, self.pixels, np.radians(self.steepest), masks, self.per_edge, self.lifted)
+
+    def _good(self, found: Facets) -> Booleans:
+        """Tell which facets agree between the pictures, (f,)."""
+        median = np.median(found.noise)
+        return (found.correlation >= self.poorest) & (found.noise <= NOISY * median)
+
+
+def _found(seen: Scene, stack: Stack, state: State, freedom: Freedom) -> Facets:
+    return facets(seen, stack, state.views, state.deviation, state.weights, freedom.columns)
+
+
+def _require_sizes(pictures: Pictures, views: Sequence[View]) -> None:
+    if len(pictures.grey) != len(views):
+        raise MeasurementError(
+            f"There are {len(pictures.grey)} pictures and {len(views)} cameras: each needs the other."
+        )
+    for number, (grey, view) in enumerate(zip(pictures.grey, views, strict=True), start=1):
+        if grey.shape[::-1] != view.camera.size:
+            raise MeasurementError(
+                f"Picture {number} has {grey.shape[1]} x {grey.shape[0]} pixels, its camera "
+                f"{view.camera.size[0]} x {view.camera.size[1]}: calibrate with pictures of the same size."
+            )
+
+
+def _require_different(pictures: Pictures) -> None:
+    for k, one in enumerate(pictures.grey):
+        for other in range(k):
+            if np.array_equal(one, pictures.grey[other]):
+                raise MeasurementError(
+                    f"The pictures of cameras {other + 1} and {k + 1} are the same: each camera needs its own picture."
+                )
+
+
+def _require_some(good: Booleans, found: Facets) -> None:
+    if good.mean() < ENOUGH:
+        raise MeasurementError(
+            f"The pictures agree on a shape near the nominal one on {100 * good.mean():.0f} % of the surface only "
+            f"(median correlation {np.median(found.correlation):.2f}): check that they show this part with its "
+            "speckle, in the order of the cameras, and that these start within half a speckle of where they belong."
+        )

@@ -1,0 +1,116 @@
+"""A sparse symmetric positive definite matrix, factored: solves, and the inverse where the matrix is not zero."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from inspect3d.arrays import Floats, Integers
+
+
+@dataclass(frozen=True, eq=False)
+class Ordering:
+    """The order in which unknowns are eliminated, and what that fixes about the factor; one per pattern.
+
+    Parameters
+    ----------
+    starts, columns : the rows of the symmetric pattern with its diagonal, n unknowns, columns ascending
+    """
+
+    starts: Integers
+    columns: Integers
+
+    @cached_property
+    def order(self) -> Integers:
+        """Return the unknowns in the order of elimination (n,): minimum degree, by SuperLU."""
+        from scipy.sparse.linalg import splu
+
+        n = len(self.starts) - 1
+        pattern = sparse.csc_matrix((-np.ones(len(self.columns)), self.columns, self.starts), shape=(n, n))
+        pattern.setdiag(np.diff(self.starts) + 1.0)
+        options = {"SymmetricMode": True}
+        return np.argsort(splu(pattern, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).perm_c)
+
+    @cached_property
+    def place(self) -> Integers:
+        """Return the place of each unknown in the order, (n,)."""
+        place = np.empty_like(self.order)
+        place[self.order] = np.arange(len(place))
+        return place
+
+    @cached_property
+    def _reordered(self) -> tuple[Integers, Integers, Integers]:
+        """Rows of the pattern in the new order: starts, columns, and where each value stood."""
+        n = len(self.starts) - 1
+        stood = sparse.csr_matrix((np.arange(len(self.columns)), self.columns, self.starts), shape=(n, n))
+        moved = stood[self.order][:, self.order].tocsr()
+        return moved.indptr.astype(np.int64), moved.indices.astype(np.int64), moved.data
+
+    @cached_property
+    def _shape(self) -> tuple[Integers, Integers]:
+        from inspect3d.correlation.sparse_kernel import symbolic
+
+        starts, columns, _ = self._reordered
+        return symbolic(starts, columns)
+
+    def factor(self, values: Floats) -> Factor:
+        """Return the factor of the matrix with these values, in the order of `columns`.
+
+        Raises
+        ------
+        ValueError
+            The matrix is not positive definite.
+        """
+        from inspect3d.correlation.sparse_kernel import factored
+
+        starts, columns, stood = self._reordered
+        parts = factored(starts, columns, values[stood], *self._shape)
+        if not (parts[3] > 0).all():
+            raise ValueError("the matrix is not positive definite")
+        return Factor(self, *parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Factor:
+    """A = L D L', rows and columns in the order of elimination."""
+
+    ordering: Ordering
+    begins: Integers
+    rows: Integers
+    lower: Floats
+    diagonal: Floats
+
+    def solve(self, right: Floats) -> Floats:
+        """Return A⁻¹ b for right-hand sides (n,) or (n, m)."""
+        from inspect3d.correlation.sparse_kernel import solve
+
+        x = np.ascontiguousarray(right[self.ordering.order].reshape(len(self.diagonal), -1))
+        solve(self.begins, self.rows, self.lower, self.diagonal, x)
+        return x[self.ordering.place].reshape(right.shape)
+
+    @cached_property
+    def _inverse(self) -> tuple[Floats, Floats]:
+        from inspect3d.correlation.sparse_kernel import inverted
+
+        return inverted(self.begins, self.rows, self.lower, self.diagonal)
+
+    @property
+    def inverse_diagonal(self) -> Floats:
+        """Return the diagonal of A⁻¹, (n,)."""
+        return self._inverse[1][self.ordering.place]
+
+    def quadratic(self, rows: sparse.csr_matrix) -> Floats:
+        """Return t' A⁻¹ t for each row t of a sparse matrix whose pairs of columns lie in the pattern of A."""
+        from inspect3d.correlation.sparse_kernel import quadratic
+
+        columns = self.ordering.place[rows.indices]
+        return quadratic(self.begins, self.rows, *self._inverse, rows.indptr.astype(np.int64), columns, rows.data)
+
+    def blocks(self, triangles: Integers) -> Floats:
+        """Return the entries of A⁻¹ between the corners of triangles (f, 3), (f, 3, 3)."""
+        from inspect3d.correlation.sparse_kernel import blocks
+
+        return blocks(self.begins, self.rows, *self._inverse, self.ordering.place[triangles])

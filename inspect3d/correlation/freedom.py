@@ -1,0 +1,158 @@
+"""What the solver may change about the cameras, and how well it is known beforehand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from inspect3d.arrays import Floats, Integers, floats
+from inspect3d.camera import View
+from inspect3d.pose import Pose
+
+POSE, LENS = 6, 9
+DISTORTION = ("k1", "k2", "p1", "p2", "k3")
+Poses = Literal["known", "common", "free"]
+
+
+@dataclass(frozen=True, eq=False)
+class Lens:
+    """Standard uncertainties of a lens: 0 is exact, infinity unknown.
+
+    Parameters
+    ----------
+    focal : px, of fx and fy together; their ratio is exact
+    centre : px, of each coordinate of the principal point
+    distortion : (5,), of k1, k2, p1, p2, k3
+    """
+
+    focal: float = 0.0
+    centre: float = 0.0
+    distortion: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+    @property
+    def sigmas(self) -> Floats:
+        """Return the uncertainties of (focal, cx, cy, k1, k2, p1, p2, k3), (8,)."""
+        return np.array([self.focal, self.centre, self.centre, *self.distortion])
+
+
+@dataclass(frozen=True, eq=False)
+class Freedom:
+    """The unknowns of the cameras, and the priors of their lenses.
+
+    A pose is changed by a small motion of the part in the CAD frame, about `origin`, before it is photographed: turns
+    and shifts (rad, mm). A lens is changed by (focal, cx, cy, k1, k2, p1, p2, k3).
+
+    Parameters
+    ----------
+    poses : "known"; "common", the cameras are a known rig but the part's place in it is not; "free", each by itself
+    lenses : of each view
+    priors : the views as they were believed to be beforehand; of these the lenses count
+    origin : (3,) mm
+    """
+
+    poses: Poses
+    lenses: tuple[Lens, ...]
+    priors: tuple[View, ...]
+    origin: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "origin", floats(self.origin, "origin", 3))
+        if len(self.lenses) != len(self.priors):
+            raise ValueError(f"{len(self.lenses)} lenses are given for {len(self.priors)} views")
+
+    @property
+    def columns(self) -> Integers:
+        """Return the parameters of a view that the kernel must differentiate by, in its numbering."""
+        open_lens = np.any([lens.sigmas > 0 for lens in self.lenses], axis=0)
+        lens = [*((6, 7) if open_lens[0] else ()), *(7 + k for k in range(1, 8) if open_lens[k])]
+        return np.array([*(range(POSE) if self.poses != "known" else ()), *lens], dtype=np.int64)
+
+    @property
+    def unknowns(self) -> int:
+        """Return m, the number of unknowns."""
+        return len(self.spread(self.columns)[1])
+
+    def spread(self, columns: Integers) -> tuple[Floats, Floats]:
+        """Return Q (v c, m) and the sigmas (m,): the parameters `columns` of all views are Q times the unknowns."""
+        views, c = len(self.lenses), len(columns)
+        at = {int(column): k for k, column in enumerate(columns)}
+        rows: list[Floats] = []
+        sigmas: list[float] = []
+        if self.poses != "known":
+            bodies = [range(views)] if self.poses == "common" else [[k] for k in range(views)]
+            for body in bodies:
+                for motion in range(POSE):
+                    row = np.zeros((views, c))
+                    row[list(body), at[motion]] = 1.0
+                    rows.append(row)
+                    sigmas.append(np.inf)
+        for k, lens in enumerate(self.lenses):
+            matrix = self.priors[k].camera.matrix
+            for number, sigma in enumerate(lens.sigmas):
+                if sigma > 0:
+                    row = np.zeros((views, c))
+                    sigmas.append(float(sigma))
+                    rows.append(row)
+                    if (6 if number == 0 else 7 + number) not in at:
+                        continue
+                    if number == 0:
+                        row[k, at[6]], row[k, at[7]] = 1.0, matrix[1, 1] / matrix[0, 0]
+                    else:
+                        row[k, at[7 + number]] = 1.0
+        return np.array(rows).reshape(len(rows), views * c).T, np.array(sigmas)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return what each unknown is called, (m,)."""
+        motions = [f"{kind} {axis}" for kind in ("turn about", "shift along") for axis in "xyz"]
+        bodies = {"known": (), "common": ("the part",), "free": tuple(f"view {k + 1}" for k in range(len(self.lenses)))}
+        names = [f"{motion} of {body}" for body in bodies[self.poses] for motion in motions]
+        parts = ("focal length", "principal point x", "principal point y", *(f"distortion {c}" for c in DISTORTION))
+        for k, lens in enumerate(self.lenses):
+            names += [f"{part} of view {k + 1}" for part, sigma in zip(parts, lens.sigmas, strict=True) if sigma > 0]
+        return tuple(names)
+
+    def scale(self, views: Sequence[View], points: Floats) -> Floats:
+        """Return the change of each unknown that moves the pictures of points (n, 3) mm by one pixel rms, (m,)."""
+        places = np.concatenate([view.project(points) for view in views])
+        found = np.empty(self.unknowns)
+        for k, size in enumerate(self._trials):
+            step = np.zeros(len(found))
+            step[k] = size
+            moved = np.concatenate([view.project(points) for view in self.moved(views, step)])
+            found[k] = size / np.sqrt(((moved - places) ** 2).sum(axis=1).mean())
+        return found
+
+    @property
+    def _trials(self) -> list[float]:
+        """Small changes of the unknowns."""
+        return [1e-6 if name.startswith(("turn", "distortion")) else 1e-3 for name in self.names]
+
+    def moved(self, views: Sequence[View], step: Floats) -> tuple[View, ...]:
+        """Return the views after a step (m,) of the unknowns."""
+        columns = np.arange(POSE + LENS)
+        spread, _ = self.spread(columns)
+        changes = (spread @ step).reshape(len(views), -1)
+        return tuple(self._moved(view, change) for view, change in zip(views, changes, strict=True))
+
+    def _moved(self, view: View, change: Floats) -> View:
+        matrix = view.camera.matrix + np.array(
+            [[change[6], 0.0, change[8]], [0.0, change[7], change[9]], [0.0, 0.0, 0.0]]
+        )
+        camera = replace(view.camera, matrix=matrix, distortion=view.camera.distortion + change[10:15])
+        return View(camera, view.camera_from_cad @ Pose.small(change[:6], self.origin))
+
+    def offset(self, views: Sequence[View]) -> Floats:
+        """Return how far the unknowns (m,) lie from their priors; zero for poses, which have none."""
+        found: list[float] = []
+        if self.poses != "known":
+            found += [0.0] * (POSE * (1 if self.poses == "common" else len(views)))
+        for lens, view, prior in zip(self.lenses, views, self.priors, strict=True):
+            change = view.camera.matrix - prior.camera.matrix
+            bent = view.camera.distortion - prior.camera.distortion
+            offsets = np.array([change[0, 0], change[0, 2], change[1, 2], *bent])
+            found += list(offsets[lens.sigmas > 0])
+        return np.array(found)

@@ -1,0 +1,112 @@
+"""The shape that stereocorrelation found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from inspect3d.arrays import Booleans, Floats
+from inspect3d.camera import View
+from inspect3d.correlation.hidden import HiddenMotion
+from inspect3d.correlation.normal import Facets
+from inspect3d.correlation.scene import Scene
+from inspect3d.correlation.solver import State
+from inspect3d.correlation.uncertainty import Uncertainty
+from inspect3d.deviate.deviation import Deviation
+from inspect3d.nominal.nominal import InspectionMesh
+from inspect3d.register.gauge import Gauge, best_fit
+
+WHOLE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A deviation field in the gauge of the solver, its covariance, and what the pictures do not tell.
+
+    Parameters
+    ----------
+    mesh : all nodes
+    scene : the facets that were measured, and their nodes
+    state : nodal motions, cameras, and the way there
+    uncertainty : of the nodes of the scene
+    hidden : motions that the pictures do not show or show weakly
+    facets : residuals and correlation of the scene's facets
+    """
+
+    mesh: InspectionMesh
+    scene: Scene
+    state: State
+    uncertainty: Uncertainty
+    hidden: tuple[HiddenMotion, ...]
+    facets: Facets
+
+    @property
+    def views(self) -> tuple[View, ...]:
+        """Return the cameras as they were found."""
+        return self.state.views
+
+    @property
+    def settled(self) -> bool:
+        """Tell whether the last step was shorter than the tolerance."""
+        return self.state.settled
+
+    @cached_property
+    def values(self) -> Floats:
+        """Return the deviation of the scene's nodes, (n,) mm, smoothed by T against the bias of linear elements."""
+        return self.uncertainty.smoother @ self.state.deviation
+
+    @cached_property
+    def sound(self) -> Booleans:
+        """Tell which nodes of the scene count as observed, (n,).
+
+        Those with at least half their evaluation points in facets on which the pictures agree, and off creases.
+        """
+        return (self.scene.share >= WHOLE) & ~self.mesh.crease[self.scene.node]
+
+    @property
+    def observed(self) -> Booleans:
+        """Tell which nodes of the mesh are observed."""
+        observed = np.zeros(len(self.mesh), dtype=bool)
+        observed[self.scene.node[self.sound]] = True
+        return observed
+
+    @cached_property
+    def residual(self) -> Floats:
+        """Return sqrt((1 - r) / 2) of each node of the mesh, r the mean correlation of its facets; NaN where unseen."""
+        scene = self.scene
+        weights = self.scene.gathered(np.ones((len(scene.triangles), 3)))
+        sums = scene.gathered(np.repeat(self.facets.correlation[:, None], 3, axis=1))
+        residual = np.full(len(self.mesh), np.nan)
+        residual[scene.node] = np.sqrt(np.clip(1 - sums / weights, 0, 2) / 2)
+        return residual
+
+    @cached_property
+    def gauge(self) -> Gauge:
+        """Return the common alignment, the robust best fit over the observed nodes."""
+        nodes = self.scene.node[self.sound]
+        mesh = self.mesh
+        return best_fit(mesh.nodes[nodes], mesh.normals[nodes], mesh.areas[nodes], self.values[self.sound])
+
+    def deviation(self, gauge: Gauge | None = None) -> Deviation:
+        """Return the deviation map of all nodes.
+
+        Parameters
+        ----------
+        gauge : the alignment to bring it into, over the observed nodes; none: the solver's own, where only cameras that
+            are known give the part its place
+        """
+        sound, n = self.sound, len(self.scene.nodes)
+        values, variances = self.values[sound], self.uncertainty.variances[sound]
+        if gauge is not None:
+            modes, solver = np.zeros((n, 6)), np.zeros((6, n))
+            modes[sound], solver[:, sound] = gauge.jacobian, gauge.solver
+            values, variances = gauge(values), self.uncertainty.variances_without(modes, solver)[sound]
+        return Deviation(self._spread(values), self._spread(np.sqrt(np.maximum(variances, 1e-300))), self.observed)
+
+    def _spread(self, values: Floats) -> Floats:
+        """Return values of the observed nodes at their places among all, NaN elsewhere."""
+        everywhere = np.full(len(self.mesh), np.nan)
+        everywhere[self.scene.node[self.sound]] = values
+        return everywhere

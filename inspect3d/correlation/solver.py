@@ -1,0 +1,198 @@
+"""Gauss-Newton for shape and cameras, coarse to fine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy import sparse
+
+from inspect3d.arrays import Floats
+from inspect3d.camera import View
+from inspect3d.correlation.freedom import Freedom, Lens
+from inspect3d.correlation.linear import noise_of, robust, stiffened, system_of
+from inspect3d.correlation.normal import Facets, facets
+from inspect3d.correlation.picture import Pictures, Stack
+from inspect3d.correlation.scene import Scene
+from inspect3d.outcome import MeasurementError
+from inspect3d.register.mobility import spread
+
+SHORTER, LONGER, LEAST, PATIENCE = 0.5, 1.2, 0.02, 4
+COARSE = 5e-4
+Moves = Literal["cameras", "shape", "both"]
+
+
+@dataclass(frozen=True)
+class Level:
+    """One stage of the way from coarse to fine.
+
+    Parameters
+    ----------
+    blur : px, standard deviation of the Gaussian over the pictures
+    stiffness : of the plate that smooths the shape, in median stiffnesses of a node; 0: none
+    steps : at most
+    moves : the cameras with the shape held (paper, eq. 4), the shape with the cameras held (eq. 8), or both at once
+    """
+
+    blur: float
+    stiffness: float
+    steps: int
+    moves: Moves = "both"
+
+
+@dataclass(frozen=True)
+class Step:
+    """How far a step went.
+
+    Parameters
+    ----------
+    level : number of its level
+    change : largest motion of a node, or of the part before a camera, mm
+    noise : root mean squared residual before it, grey levels
+    """
+
+    level: int
+    change: float
+    noise: float
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Where the solver stands.
+
+    Parameters
+    ----------
+    deviation : (n,) mm, of the nodes of the scene
+    views : the cameras
+    weights : (f,) of the facets
+    steps : how it came there
+    settled : the last step was shorter than the tolerance
+    """
+
+    deviation: Floats
+    views: tuple[View, ...]
+    weights: Floats
+    steps: tuple[Step, ...] = ()
+    settled: bool = False
+
+
+@dataclass(frozen=True)
+class Solver:
+    """The way from coarse to fine, and when to stop.
+
+    Parameters
+    ----------
+    levels : in their order
+    tolerance : mm; the last level ends when no node moves farther in a step, the others at half a micrometre
+
+    After four steps of a level, one that turns back is halved, and so are the next until they go on: where the
+    pictures show a motion weakly, a full step goes too far and the next comes back. The robust weights of the facets
+    settle in the first steps of a level and are then kept, lest they take turns. Blurred pictures show less, and are
+    compared at fewer points: one of 1 + blur².
+    """
+
+    levels: tuple[Level, ...]
+    tolerance: float = 1e-5
+
+    def __call__(
+        self,
+        scene: Scene,
+        pictures: Pictures,
+        views: Sequence[View],
+        freedom: Freedom,
+        start: Floats | None = None,
+        told: Callable[[Step], None] = lambda step: None,
+    ) -> State:
+        """Return the shape and the cameras that agree best with the pictures.
+
+        Parameters
+        ----------
+        views : the start
+        freedom : what may change about the cameras
+        start : (n,) mm, deviation to start from; none: the nominal shape
+        told : called after each step
+
+        Raises
+        ------
+        MeasurementError
+            The pictures say nothing about the part.
+        """
+        deviation = np.zeros(len(scene.nodes)) if start is None else start
+        state = State(deviation, tuple(views), np.ones(len(scene.triangles)))
+        stacks: dict[float, Stack] = {}
+        for number, level in enumerate(self.levels):
+            if level.blur not in stacks:
+                stacks = {level.blur: pictures.blurred(level.blur)}
+            state = self._descended(scene, stacks[level.blur], state, freedom, number, told)
+        return state
+
+    def _descended(
+        self, scene: Scene, stack: Stack, state: State, freedom: Freedom, number: int, told: Callable[[Step], None]
+    ) -> State:
+        level = self.levels[number]
+        freedom = freedom if level.moves != "shape" else held(freedom)
+        points = scene.points.thinned(1 + int(level.blur) ** 2) if level.blur >= 1 else scene.points
+        final = number == len(self.levels) - 1
+        tolerance = self.tolerance if final else max(self.tolerance, COARSE)
+        last, factor = np.zeros(len(scene.nodes)), 1.0
+        for count in range(level.steps):
+            found = facets(scene, stack, state.views, state.deviation, state.weights, freedom.columns, points=points)
+            if not np.isfinite(found.noise).any():
+                raise MeasurementError(
+                    "The pictures show no grey levels that vary where the part should be: check that they are of this "
+                    "part, exposed right, and that the cameras stand where they are said to."
+                )
+            noise = noise_of(found, state.weights, len(scene.nodes))
+            shape, cameras = _step(scene, found, noise, state, freedom, level)
+            change = max(float(np.abs(shape).max()), _reach(scene, cameras, freedom) if level.moves == "cameras" else 0)
+            if count >= PATIENCE:
+                factor = max(factor * SHORTER, LEAST) if shape @ last < 0 else min(factor * LONGER, 1.0)
+            step = Step(number, change, float(np.sqrt(noise)))
+            told(step)
+            state = State(
+                state.deviation + factor * shape,
+                freedom.moved(state.views, factor * cameras),
+                robust(found) if count < PATIENCE else state.weights,
+                (*state.steps, step),
+                change < tolerance,
+            )
+            if state.settled:
+                break
+            last = shape
+        return state
+
+
+def held(freedom: Freedom) -> Freedom:
+    """Return the freedom of cameras that may not change."""
+    return replace(freedom, poses="known", lenses=tuple(Lens() for _ in freedom.lenses))
+
+
+def _step(
+    scene: Scene, found: Facets, noise: float, state: State, freedom: Freedom, level: Level
+) -> tuple[Floats, Floats]:
+    mixing, sigmas = freedom.spread(freedom.columns)
+    scale = freedom.scale(state.views, scene.nodes)
+    camera_right = mixing.T @ found.camera_right / noise - freedom.offset(state.views) / sigmas**2
+    if level.moves == "cameras":
+        matrix = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)
+        inverse = np.linalg.pinv(matrix * scale * scale[:, None], 1e-10, hermitian=True)
+        return np.zeros(len(scene.nodes)), scale * (inverse @ (scale * camera_right))
+    factors = state.weights * found.clean
+    system = system_of(scene, found, factors, noise, freedom, freedom.columns, scale, level.stiffness)
+    right = scene.gathered(found.right * (state.weights / noise)[:, None])
+    if level.stiffness > 0:
+        _, plate = stiffened(scene, scene.assembled(found.node * (factors / noise)[:, None, None]), level.stiffness)
+        n, ordering = len(scene.nodes), scene.ordering
+        right -= sparse.csr_matrix((plate, ordering.columns, ordering.starts), shape=(n, n)) @ state.deviation
+    return system.solve(right, camera_right)
+
+
+def _reach(scene: Scene, cameras: Floats, freedom: Freedom) -> float:
+    """Return how far a step of the poses moves the part before a camera, mm."""
+    if freedom.poses == "known":
+        return 0.0
+    motions = freedom.spread(np.arange(6))[0] @ cameras
+    length = spread(scene.nodes, np.ones(len(scene.nodes)), scene.centre)
+    return float(np.abs(motions.reshape(-1, 6) * np.array([length] * 3 + [1.0] * 3)).max())

@@ -1,0 +1,307 @@
+"""The parts of the correlation engine against brute force, closed forms and invariances."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from inspect3d.camera import View
+from inspect3d.correlation.evaluation import centres, evaluation_points, points_per_edge
+from inspect3d.correlation.factor import Ordering
+from inspect3d.correlation.freedom import Freedom, Lens
+from inspect3d.correlation.linear import gauge_of
+from inspect3d.correlation.normal import facets
+from inspect3d.correlation.picture import Pictures
+from inspect3d.correlation.reading_kernel import lens_slope
+from inspect3d.correlation.scene import scene
+from inspect3d.correlation.visibility import visibility
+from inspect3d.nominal.nominal import Nominal
+from inspect3d.nominal.surface import Surface
+from inspect3d.pose import Pose
+from tests.jit import printed
+from tests.sheets import plane, plane_normals, sheet
+from tests.speckled import Speckle, picture, rig
+
+STEEPEST = np.radians(65)
+ALL = np.arange(15)
+
+
+@pytest.fixture(scope="module")
+def flat():
+    """Return a flat sheet, two views of it, and what they see."""
+    nominal, views = sheet(plane, plane_normals, edge=9.0), rig()
+    return nominal, views, scene(nominal, views, 6.0, STEEPEST, [None, None])
+
+
+@pytest.fixture(scope="module")
+def wavy():
+    """Return a wavy sheet, two views with distorting lenses, what they see, and exact pictures of it."""
+    nominal, views = sheet(edge=6.0), rig(distortion=(-0.1, 0.2, 1e-3, -1e-3, 0.1))
+    speckle = Speckle.drawn(np.random.default_rng(0), 0.7)
+    stack = Pictures([picture(view, speckle) for view in views]).blurred(0.0)
+    return nominal, views, scene(nominal, views, 4.0, STEEPEST, [None, None]), stack
+
+
+def accumulated(seen, stack, views, deviation=None, columns=ALL):
+    """Return what the pictures say, at the nominal shape unless told."""
+    deviation = np.zeros(len(seen.nodes)) if deviation is None else deviation
+    return facets(seen, stack, views, deviation, np.ones(len(seen.triangles)), columns, power=0)
+
+
+def test_a_sampled_picture_goes_through_its_pixels_and_its_gradient_is_its_slope():
+    grey = np.random.default_rng(0).uniform(0, 255, (20, 30))
+    stack = Pictures([grey, grey]).blurred(0.0)
+    inside = np.stack(np.meshgrid(np.arange(2, 27), np.arange(2, 17)), axis=-1).reshape(-1, 2).astype(float)
+    assert stack.sampled(0, inside)[:, 0] == pytest.approx(grey[2:17, 2:27].ravel())
+    places = inside[:-30] + np.array([0.3, 0.6])
+    found, small = stack.sampled(1, places), 1e-5
+    for axis in range(2):
+        step = small * np.eye(2)[axis]
+        slope = (stack.sampled(1, places + step)[:, 0] - stack.sampled(1, places - step)[:, 0]) / (2 * small)
+        assert found[:, 1 + axis] == pytest.approx(slope, abs=1e-4)
+
+
+def test_linear_sampling_is_exact_for_a_bilinear_picture():
+    rows, columns = np.mgrid[:12, :15]
+    grey = 3.0 + 2.0 * columns - rows + 0.5 * rows * columns
+    places = np.random.default_rng(1).uniform(1, 10, (50, 2))
+    x, y = places.T
+    found = Pictures([grey, grey], "linear").blurred(0.0).sampled(0, places)
+    assert found == pytest.approx(np.stack([3 + 2 * x - y + 0.5 * x * y, 2 + 0.5 * y, -1 + 0.5 * x], axis=1))
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 12])
+def test_the_points_of_a_facet_are_uniform(n):
+    shapes = centres(n)
+    assert len(shapes) == len(np.unique(shapes.round(9), axis=0)) == n * n
+    assert (shapes > 0).all()
+    assert shapes.sum(axis=1) == pytest.approx(1.0)
+    assert shapes.mean(axis=0) == pytest.approx(1 / 3)
+    assert shapes.T @ shapes / n**2 == pytest.approx((np.ones((3, 3)) + np.eye(3)) / 12, abs=0.1 / n**2)
+
+
+def test_lifted_points_lie_on_the_surface_and_flat_ones_off_it_by_a_chord_that_falls_with_the_square_of_the_edge():
+    chords = []
+    for edge in (6.0, 3.0):
+        nominal = sheet(edge=edge, fine=0.25)
+        every = np.full(len(nominal.mesh.triangles), 4)
+        lifted = evaluation_points(nominal, every)
+        assert np.abs(nominal.surface.closest(lifted.places).distance).max() < 1e-9
+        chords.append(evaluation_points(nominal, every, lifted=False).chord)
+    assert chords[0] / chords[1] == pytest.approx(4.0, rel=0.25)
+
+
+def test_a_facet_has_as_many_points_as_its_picture_has_room_for(flat):
+    nominal, views, _ = flat
+    count = points_per_edge(nominal.mesh, views, 4.0, least=1)
+    pixels = views[0].project(nominal.mesh.nodes)[nominal.mesh.triangles]
+    a, b = pixels[:, 1] - pixels[:, 0], pixels[:, 2] - pixels[:, 0]
+    area = 0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    assert (count**2 * 4.0 >= 0.95 * area).all()
+    assert np.median(count**2 * 4.0 / area) < 1.25
+
+
+def test_what_a_plate_in_front_of_the_part_hides_is_not_seen_by_that_camera(flat):
+    nominal, views, _ = flat
+    points = evaluation_points(nominal, np.full(len(nominal.mesh.triangles), 4))
+    middle = 0.5 * (views[0].centre + np.array([20.0, 20.0, 0.0]))
+    corners = middle + np.array([[-6.0, -6, 0], [6, -6, 0], [6, 6, 0], [-6, 6, 0]])
+    surface = nominal.surface
+    both = Surface(
+        np.concatenate([surface.vertices, corners]),
+        np.concatenate([surface.triangles, np.array([[0, 1, 2], [0, 2, 3]]) + len(surface.vertices)]),
+    )
+    hidden = visibility(Nominal("hidden", both, nominal.mesh), points, views, STEEPEST, [None, None])
+    free = visibility(nominal, points, views, STEEPEST, [None, None])
+    shadow = (
+        views[0].centre
+        + (points.places - views[0].centre)
+        * ((middle[2] - views[0].centre[2]) / (points.places[:, 2] - views[0].centre[2]))[:, None]
+    )
+    behind = (np.abs(shadow - middle)[:, :2] < 6).all(axis=1)
+    assert behind.any()
+    assert (hidden.seen[0] == (free.seen[0] & ~behind)).all()
+    assert (hidden.seen[1] == free.seen[1]).all()
+    assert not (hidden.used & ~(hidden.seen.all(axis=0))).any()
+
+
+def test_what_is_masked_in_one_picture_is_not_used(flat):
+    nominal, views, _ = flat
+    points = evaluation_points(nominal, np.full(len(nominal.mesh.triangles), 4))
+    mask = np.ones((480, 620), bool)
+    mask[:, :300] = False
+    used = visibility(nominal, points, views, STEEPEST, [None, mask]).used
+    assert used.any()
+    assert (views[1].project(points.places[used])[:, 0] >= 299.5).all()
+
+
+def test_the_right_hand_side_is_the_slope_of_the_energy_for_fixed_weights(wavy):
+    _, views, seen, stack = wavy
+    random = np.random.default_rng(3)
+    deviation = random.normal(0, 0.003, len(seen.nodes))
+    found = accumulated(seen, stack, views, deviation)
+    step = random.normal(0, 1e-4, len(seen.nodes)) + 0.01 * deviation
+    weights = found.energy / (1 - found.correlation)
+    ahead, back = (weights @ (1 - accumulated(seen, stack, views, deviation + k * step).correlation) for k in (1, -1))
+    assert -seen.gathered(found.right) @ step == pytest.approx((ahead - back) / 4, rel=0.05)
+
+
+def test_the_slopes_of_a_lens_are_those_of_its_projection():
+    view = rig(distortion=(-0.1, 0.2, 1e-3, -1e-3, 0.1))[0]
+    free = Freedom("known", (Lens(1.0, 1.0, (1.0,) * 5),), (view,), np.zeros(3))
+    point = np.array([[0.05, -0.08, 1.0]])
+    for k, column in enumerate([6, 8, 9, 10, 11, 12, 13, 14]):
+        step = 1e-3 * np.eye(8)[k]
+        ahead, back = (free.moved((view,), sign * step)[0].camera.project(point)[0] for sign in (1, -1))
+        slope = np.array(lens_slope(column, view.camera.matrix, view.camera.distortion, *point[0, :2]))
+        if column == 6:
+            slope += lens_slope(7, view.camera.matrix, view.camera.distortion, *point[0, :2])
+        assert slope == pytest.approx((ahead - back) / 2e-3, rel=1e-6, abs=1e-8)
+
+
+def test_moving_the_part_before_the_cameras_is_moving_its_nodes(wavy):
+    _, views, seen, stack = wavy
+    found = accumulated(seen, stack, views)
+    common = Freedom("common", (Lens(), Lens()), views, seen.centre)
+    mixing, _ = common.spread(ALL)
+    gauge = gauge_of(seen, common)
+    nodes = seen.assembled(found.node)
+    matrix = sparse.csr_matrix((nodes, seen.ordering.columns, seen.ordering.starts))
+    cross = seen.gathered(found.cross) @ mixing
+    camera = mixing.T @ found.camera @ mixing
+    from inspect3d.register.mobility import jacobian
+
+    fields = jacobian(seen.nodes, seen.normals, seen.centre)
+    assert np.linalg.matrix_rank(np.column_stack([gauge, fields])) == 6
+    stiffness = np.diag(fields.T @ (matrix @ fields))
+    slack = fields.T @ (matrix @ fields) - 2 * fields.T @ cross + camera
+    assert (np.abs(np.diag(slack)) < 0.02 * stiffness).all()
+
+
+def test_sliding_all_pictures_together_over_a_plane_has_no_stiffness_at_all(flat):
+    _, views, seen = flat
+    random = np.random.default_rng(0)
+    stack = Pictures([random.uniform(0, 255, (480, 620)) for _ in views]).blurred(0.5)
+    found = accumulated(seen, stack, views)
+    mixing, _ = Freedom("common", (Lens(), Lens()), views, seen.centre).spread(ALL)
+    stiffness = np.diag(mixing.T @ found.camera @ mixing)
+    alone = np.diag(found.camera)[:6]
+    assert (stiffness[[2, 3, 4]] < 1e-12 * alone[[2, 3, 4]]).all()
+    assert (stiffness[[0, 1, 5]] > 1e-3 * alone[[0, 1, 5]]).all()
+
+
+def test_gradient_noise_is_told_from_curvature(wavy):
+    _, views, seen, stack = wavy
+    random = np.random.default_rng(4)
+    exact = accumulated(seen, stack, views, columns=np.empty(0, np.int64))
+    levels = stack.levels + 0.0
+    from scipy.ndimage import spline_filter
+
+    for level in levels:
+        level += spline_filter(random.normal(0, 12.0, level.shape), order=3, mode="mirror")
+    noisy = accumulated(seen, type(stack)(levels, stack.sizes, True), views, columns=np.empty(0, np.int64))
+    curvature = np.trace(exact.node.sum(axis=0))
+    assert np.trace(noisy.node.sum(axis=0)) > 1.03 * curvature
+    cleaned = np.einsum("fii,f->", noisy.node, noisy.clean)
+    assert cleaned == pytest.approx(curvature, rel=0.02)
+    assert exact.clean.min() > 0.98
+
+
+def test_a_sparse_factor_solves_and_inverts_as_a_dense_one_does():
+    random = np.random.default_rng(0)
+    dense = np.where(random.uniform(size=(60, 60)) < 0.06, random.normal(size=(60, 60)), 0.0)
+    matrix = sparse.csr_matrix(dense @ dense.T + np.eye(60))
+    matrix.sort_indices()
+    ordering = Ordering(matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64))
+    factor, inverse = ordering.factor(matrix.data), np.linalg.inv(matrix.toarray())
+    right = random.normal(size=(60, 3))
+    assert factor.solve(right) == pytest.approx(inverse @ right)
+    assert factor.solve(right[:, 0]) == pytest.approx(inverse @ right[:, 0])
+    assert factor.inverse_diagonal == pytest.approx(np.diag(inverse))
+    rows = sparse.csr_matrix(np.where(matrix.toarray() != 0, 1.0, 0.0) * np.eye(60))
+    assert factor.quadratic(rows) == pytest.approx(np.diag(inverse))
+    with pytest.raises(ValueError, match="positive definite"):
+        ordering.factor(-matrix.data)
+
+
+def test_the_smoother_takes_the_bias_of_linear_elements_off_a_parabola():
+    nominal, views = sheet(plane, plane_normals, edge=3.0), rig()
+    seen = scene(nominal, views, 20.0, STEEPEST, [None, None])
+    x, y = seen.nodes[:, 0], seen.nodes[:, 1]
+    wanted = (x - 30) ** 2 / 500
+    centre = np.einsum("pi,pij->pj", seen.points.shapes, seen.nodes[seen.triangles[seen.points.facet]])
+    shapes = sparse.csr_matrix(
+        (seen.points.shapes.ravel(), seen.triangles[seen.points.facet].ravel(), 3 * np.arange(len(centre) + 1))
+    )
+    fitted = sparse.linalg.spsolve((shapes.T @ shapes).tocsc(), shapes.T @ ((centre[:, 0] - 30) ** 2 / 500))
+    inner = (x > 9) & (x < 51) & (y > 9) & (y < 36)
+    smooth = seen.smoother(np.ones(len(seen.triangles))) @ fitted
+    assert np.abs(fitted - wanted)[inner].max() > 0.0025
+    assert np.abs(smooth - wanted)[inner].max() < 0.0004
+
+
+def test_a_step_of_the_cameras_and_its_opposite_cancel():
+    views = rig()
+    free = Freedom("free", (Lens(10.0, 5.0, (0.1,) * 5),) * 2, views, np.array([30.0, 22.5, 0.0]))
+    step = np.random.default_rng(0).normal(0, 1e-3, free.unknowns) * free.scale(
+        views, np.array([[10.0, 10.0, 0.0]] * 2)
+    )
+    there = free.moved(views, step)
+    assert free.offset(there)[12:] == pytest.approx(step[12:])
+    for back, view in zip(free.moved(there, -step), views, strict=True):
+        assert back.camera.matrix == pytest.approx(view.camera.matrix)
+        assert back.camera_from_cad.matrix == pytest.approx(view.camera_from_cad.matrix, abs=1e-6)
+
+
+def test_the_gauge_of_free_poses_has_seven_fields_and_that_of_a_plane_four():
+    wavy, views = sheet(edge=9.0), rig()
+    for nominal, poses, count in ((wavy, "free", 7), (wavy, "common", 6), (wavy, "known", 0)):
+        seen = scene(nominal, views, 20.0, STEEPEST, [None, None])
+        gauge = gauge_of(seen, Freedom(poses, (Lens(), Lens()), views, seen.centre))
+        assert gauge.shape[1] == count
+        assert gauge.T @ gauge == pytest.approx(np.eye(count))
+    seen = scene(sheet(plane, plane_normals, edge=9.0), views, 20.0, STEEPEST, [None, None])
+    assert gauge_of(seen, Freedom("free", (Lens(), Lens()), views, seen.centre)).shape[1] == 3
+
+
+PROGRAM = """
+import numpy as np
+from tests.test_correlation_parts import ALL, STEEPEST, accumulated
+from tests.sheets import sheet
+from tests.speckled import rig
+from inspect3d.correlation.picture import Pictures
+from inspect3d.correlation.reading_kernel import lens_slope
+from inspect3d.correlation.scene import scene
+nominal, views = sheet(edge=30.0, fine=7.5), rig()
+seen = scene(nominal, views, 1e9, STEEPEST, [None, None])
+random = np.random.default_rng(0)
+found = accumulated(seen, Pictures([random.uniform(0, 255, (480, 620)) for _ in views]).blurred(2.0), views)
+print(found.node.sum(), found.right.sum(), found.cross.sum(), found.camera.sum(), found.statistics.sum())
+matrix = seen.assembled(found.node) + seen.plate
+print(seen.ordering.factor(matrix).inverse_diagonal.sum())
+"""
+
+
+def test_the_kernels_say_the_same_with_the_compiler_on_and_off():
+    compiled, plain = (np.array(printed(PROGRAM, jit).split(), float) for jit in (True, False))
+    assert compiled == pytest.approx(plain, rel=1e-6)
+
+
+def test_a_view_that_moves_sees_what_a_part_that_moves_shows():
+    views = rig()
+    motion = Pose.small(np.array([1e-3, 2e-3, -1e-3, 0.1, 0.2, -0.1]), np.zeros(3))
+    points = np.random.default_rng(0).uniform(0, 40, (5, 3))
+    moved = View(views[0].camera, views[0].camera_from_cad @ motion)
+    assert moved.project(points) == pytest.approx(views[0].project(motion(points)))
+
+
+def test_points_near_the_outline_of_the_part_are_not_used(flat):
+    nominal, views, _ = flat
+    points = evaluation_points(nominal, np.full(len(nominal.mesh.triangles), 12))
+    used = visibility(nominal, points, views, STEEPEST, [None, None]).used
+    rim = np.concatenate([np.stack([np.linspace(0, 60, 500), np.full(500, y), np.zeros(500)], 1) for y in (0.0, 45.0)])
+    for view in views:
+        near, edge = view.project(points.places[used]), view.project(rim)
+        assert min(np.linalg.norm(edge - pixel, axis=1).min() for pixel in near) > 3.0
+    assert used.mean() > 0.9
