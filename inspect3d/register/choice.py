@@ -68,9 +68,11 @@ def choose(fits: list[Fit], smooth: Smooth, points: Floats) -> Choice:
 
 
 def free_in(fit: Fit, smooth: Smooth) -> Floats:
-    """Return the free motions (k, 6) of a fit, about the centre of its points."""
+    """Return the free motions (k, 6) of a fit, about the centre of its points; all where no point is near."""
     width = 3 * fit.scale + 1e-3 * smooth.surface.diagonal
     part = fit.agrees & ~fit.feet.on_rim & (np.abs(fit.feet.distance) < width)
+    if np.count_nonzero(part) < 6:
+        return np.eye(6)
     feet = fit.feet.points[part]
     normals = smooth.normals(feet, fit.feet.triangle[part])
     return Gauge(feet, normals, np.ones(len(feet))).free
