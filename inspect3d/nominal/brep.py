@@ -14,8 +14,9 @@ from inspect3d.nominal.closest_parameters import closest_parameters
 
 _OWNED = 5e-7
 _POLE = 1e-10
+_BORDER = 1e-6
 _COMPASS = np.stack([np.cos(np.arange(8) * np.pi / 4), np.sin(np.arange(8) * np.pi / 4)], axis=1)
-_HAIRS = (np.zeros(2), *(length * direction for length in (1e-5, 1e-3, 2e-2) for direction in _COMPASS))
+_HAIRS = (np.zeros(2), *(length * direction for length in (1e-6, 1e-5, 1e-4, 1e-3, 2e-2) for direction in _COMPASS))
 """Steps in mm to try from a border, the shortest first."""
 
 
@@ -121,6 +122,16 @@ class Brep:
             within[members] = [state != TopAbs_State.TopAbs_OUT for state in states]
         return within
 
+    def clearly_inside(self, face: Integers, uv: Floats) -> Booleans:
+        """Tell which parameters (n, 2) lie within the trimmed region of their face, off its border; slower, surer."""
+        from OCP.BRepClass import BRepClass_FaceClassifier
+        from OCP.gp import gp_Pnt2d
+        from OCP.TopAbs import TopAbs_State
+
+        rows = zip(face.tolist(), map(self._in_range, face.tolist(), uv.tolist()), strict=True)
+        regions = (BRepClass_FaceClassifier(self.faces[number - 1], gp_Pnt2d(*at), _BORDER) for number, at in rows)
+        return np.array([region.State() == TopAbs_State.TopAbs_IN for region in regions], dtype=bool)
+
     def owned(self, face: int, uv: Floats) -> Floats:
         """Return the point (3,) at the parameters uv (2,) on the border of a face, or one a hair within the face.
 
@@ -139,6 +150,16 @@ class Brep:
             if BRepExtrema_DistShapeShape(vertex, self.faces[face - 1]).Value() < _OWNED:
                 return np.array(near.Coord())
         return np.array(point.Coord())
+
+    def _in_range(self, face: int, uv: list[float]) -> tuple[float, float]:
+        """Return the parameters less whole periods, so that they lie in the range of the face."""
+        surface = self.surfaces[face - 1]
+        u, v = uv
+        if surface.IsUPeriodic():
+            u -= np.floor((u - surface.FirstUParameter()) / surface.UPeriod()) * surface.UPeriod()
+        if surface.IsVPeriodic():
+            v -= np.floor((v - surface.FirstVParameter()) / surface.VPeriod()) * surface.VPeriod()
+        return float(u), float(v)
 
     def _by_face(self, face: Integers, uv: Floats, evaluate: Callable[[Any, list], np.ndarray]) -> Floats:
         values = np.empty((len(uv), 3))

@@ -97,7 +97,8 @@ class Lines:
         return Placed(points, self._vertex_normals[vertex], face, self._folded[vertex])
 
     def at_segments(self, segment: Integers, share: Floats, nodes: Floats) -> Placed:
-        """Return the exact points of edges nearest to nodes (k, 3) mm, on their faces of the lowest number.
+        """Return the exact points of edges nearest to nodes (k, 3) mm, on the face they gape from least,
+        or of two the one with the lower number.
 
         Parameters
         ----------
@@ -123,15 +124,27 @@ class Lines:
     def _on_edges(self, segment: Integers, share: Floats, nodes: Floats) -> _OnEdges:
         brep = self.tessellation.brep
         edge = self.tessellation.segment_edge[segment]
-        rows = zip(edge.tolist(), self._t(segment, share).tolist(), nodes, strict=True)
-        t = np.array([_closest_on_curve(brep.curves[e], start, point) for e, start, point in rows])
-        face = np.array([brep.edge_faces[e][0] for e in edge.tolist()], dtype=np.int64)
-        last = np.array([brep.edge_faces[e][-1] for e in edge.tolist()], dtype=np.int64)
-        uv = self._uv(edge, face, t)
-        one, other = brep.normals_at(face, uv), brep.normals_at(last, self._uv(edge, last, t))
+        curves = [brep.curves[e] for e in edge.tolist()]
+        rows = zip(curves, self._t(segment, share).tolist(), nodes, strict=True)
+        t = np.array([_closest_on_curve(curve, start, point) for curve, start, point in rows])
+        on_curve = np.array([curve.Value(at).Coord() for curve, at in zip(curves, t.tolist(), strict=True)])
+        ends = np.array(
+            [(brep.edge_faces[e][0], brep.edge_faces[e][-1]) for e in edge.tolist()], dtype=np.int64
+        ).reshape(-1, 2)
+        uvs = [self._uv(edge, face, t) for face in ends.T]
+        gapes = [
+            np.linalg.norm(brep.points_at(f, uv) - on_curve.reshape(-1, 3), axis=1)
+            for f, uv in zip(ends.T, uvs, strict=True)
+        ]
+        second = gapes[1] < gapes[0] - _GAPE
+        one, other = (brep.normals_at(face, uv) for face, uv in zip(ends.T, uvs, strict=True))
         both = unit(one + other)
-        normals = np.where(both.any(axis=1, keepdims=True), both, one)
-        return _OnEdges(face, uv, normals, (one * other).sum(axis=1) < np.cos(FEATURE_ANGLE))
+        return _OnEdges(
+            face=np.where(second, ends[:, 1], ends[:, 0]),
+            uv=np.where(second[:, None], uvs[1], uvs[0]),
+            normals=np.where(both.any(axis=1, keepdims=True), both, one),
+            crease=(one * other).sum(axis=1) < np.cos(FEATURE_ANGLE),
+        )
 
     @cached_property
     def _curves(self) -> dict[tuple[int, int], Any]:

@@ -14,12 +14,15 @@ from inspect3d.nominal.tessellation import Tessellation
 SNAP = 0.1
 """A node of a sharp edge or a corner lies nearer to its line than this share of the element size."""
 
+_NEAR = 0.05
+"""Nodes of a face nearer to its border than this share of the element size are looked at twice."""
+
 
 def placed(tessellation: Tessellation, nodes: Floats, normals: Floats, feature: Booleans, size: float) -> Placed:
     """Return nodes near a tessellated B-rep at their places on it.
 
-    A node on a line where faces meet or end lies on the face of the lowest number there, at the parameters of its
-    border, and so within the edge's tolerance of the others.
+    A node on a line where faces meet or end lies on the one that gapes from the line least, or else has the lowest
+    number, at the parameters of its border, and so within the edge's tolerance of the others.
 
     Parameters
     ----------
@@ -67,6 +70,11 @@ def _on_faces(lines: Lines, nodes: Floats, normals: Floats, size: float) -> Plac
     reached = mesh.brep.inside(other, beyond_uv) & (np.linalg.norm(beyond - feet[over], axis=1) < size)
     there, left = over[reached], over[~reached]
     points[there], uv[there], face[there] = beyond[reached], beyond_uv[reached], other[reached]
+
+    to_border = nearest_on_segments(feet, *lines.ends(slice(None)), size / 4).distance
+    near = np.flatnonzero(to_border < _NEAR * size)
+    for k in near[~mesh.brep.clearly_inside(face[near], uv[near])].tolist():
+        points[k] = mesh.brep.owned(int(face[k]), uv[k])
 
     result = Placed(points, mesh.brep.normals_at(face, uv), face, np.zeros(len(nodes), dtype=bool))
     _assign(result, left, lines.at_segments(segment[~reached], share[~reached], feet[left]))
