@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -79,6 +80,12 @@ def _require_step(path: Path) -> None:
         raise InputError(f"{path.name} is not a STEP file: it does not begin with ISO-10303-21.")
     if b"END-ISO-10303-21" not in text[-1024:] or b"ENDSEC" not in text:
         raise InputError(f"{path.name} is cut off: its last line END-ISO-10303-21 is missing; export or copy it again.")
+    # OpenCASCADE crashes on references that lead nowhere.
+    data = re.sub(rb"'[^']*'", b"", text)
+    missing = set(re.findall(rb"#(\d+)", data)) - set(re.findall(rb"#(\d+)\s*=", data))
+    if missing:
+        first = min(map(int, missing))
+        raise InputError(f"{path.name} is damaged: it refers to #{first}, which it does not define; export it again.")
 
 
 def _require_iges(path: Path) -> None:
