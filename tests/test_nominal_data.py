@@ -79,7 +79,7 @@ def test_nodes_of_a_step_file_lie_on_the_face_that_owns_them(data: Path, name: s
 
 
 @pytest.mark.parametrize("name", STEP)
-def test_sampled_creases_lie_on_a_neighbour_within_five_quarters_of_the_tolerance_of_the_edge(data: Path, name: str) -> None:
+def test_sampled_creases_lie_on_a_neighbour_within_five_quarters_of_its_tolerance(data: Path, name: str) -> None:
     part, mesh = coarse(data / name)
     beside: dict[int, list[tuple[int, float]]] = {}
     for faces, tolerance in zip(part.edge_faces, part.edge_tolerance.tolist(), strict=True):
