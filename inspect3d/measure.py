@@ -9,9 +9,12 @@ from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 
-from inspect3d.arrays import Floats, floats
+from inspect3d.arrays import Booleans, Floats, Integers, booleans, floats, integers
+from inspect3d.camera import View
+from inspect3d.figure import Figure
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import InputError
+from inspect3d.pose import Pose
 
 
 @dataclass(frozen=True)
@@ -96,12 +99,63 @@ class Measurement:
         return np.concatenate([cloud.points for cloud in self.clouds])
 
 
+class FieldCovariance(Protocol):
+    """The covariance of a field at k nodes, as what it does: of many nodes it is too large to write down."""
+
+    @property
+    def variances(self) -> Floats:
+        """Return its diagonal, (k,) mm²."""
+
+    def covariance(self, columns: Floats) -> Floats:
+        """Return it times columns (k, m)."""
+
+
+@dataclass(frozen=True, eq=False)
+class NodalMeasurement:
+    """What a method measured that moves the nodes of the inspection mesh themselves, before the common alignment.
+
+    Parameters
+    ----------
+    node : (k,) numbers of the nodes that it moved
+    value : (k,) mm, their deviations; the rigid motion in them is the method's own choice unless `placed`
+    sound : (k,), whether the deviation can be trusted
+    uncertainty : of `value`
+    cad_from_measured : where the method found the part in the frame of its instrument
+    placed : whether the instrument's frame was known to be the CAD's, so that a rigid motion in `value` is measured
+    scale_known : False where the method cannot tell a larger part from a smaller one
+    views : the cameras in the CAD frame, if it has any
+    residual : (n,) normalised grey-level residual at every node of the mesh, NaN where there is none
+    hidden : the motions that the data cannot tell, in words
+    figures : what the report shows of the way there
+    remarks : what the report must say, a sentence each
+    """
+
+    node: Integers
+    value: Floats
+    sound: Booleans
+    uncertainty: FieldCovariance
+    cad_from_measured: Pose
+    placed: bool = False
+    scale_known: bool = True
+    views: tuple[View, ...] = ()
+    residual: Floats | None = None
+    hidden: tuple[str, ...] = ()
+    figures: tuple[Figure, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "node", integers(self.node, "node", None))
+        object.__setattr__(self, "value", floats(self.value, "value", len(self.node)))
+        object.__setattr__(self, "sound", booleans(self.sound, "sound", len(self.node)))
+
+
 @runtime_checkable
 class Measure(Protocol):
     """A measuring method: a frozen dataclass whose fields are its settings.
 
     Its `repr` is the provenance line of the report. It is registered under the entry point group
-    `inspect3d.measurements`; the recipe's table, less the keys that every method shares, builds it.
+    `inspect3d.measurements`; the recipe's table, less the keys that every method shares, builds it. A method that must
+    know where the part starts has a field `alignment`, and gets that table too.
     """
 
     def open(self, files: Files) -> Any:
@@ -117,7 +171,7 @@ class Measure(Protocol):
             A file is missing, broken or not of this method.
         """
 
-    def __call__(self, source: Any, nominal: Nominal) -> Measurement:
+    def __call__(self, source: Any, nominal: Nominal) -> Measurement | NodalMeasurement:
         """Measure.
 
         Raises

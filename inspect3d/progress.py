@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Protocol
@@ -16,8 +17,8 @@ class Display(Protocol):
     def begin(self, words: str) -> None:
         """Show that a stage begins."""
 
-    def update(self, fraction: float) -> None:
-        """Show how much of the stage is done, from 0 to 1."""
+    def update(self, fraction: float, words: str = "") -> None:
+        """Show how much of the stage is done, from 0 to 1, and what it is at."""
 
     def end(self) -> None:
         """Show that the stage is over."""
@@ -29,7 +30,7 @@ class Silent:
     def begin(self, words: str) -> None:
         """Show nothing."""
 
-    def update(self, fraction: float) -> None:
+    def update(self, fraction: float, words: str = "") -> None:
         """Show nothing."""
 
     def end(self) -> None:
@@ -57,13 +58,23 @@ class Progress:
         """Show a stage while the block runs, and record its seconds whether it ends well or not."""
         start = perf_counter()
         self.display.begin(f"{subject}: {words}" if subject else words)
+        before = _running.set(self)
         try:
             yield
         finally:
+            _running.reset(before)
             self.display.end()
             past = self.seconds[subject].get(words, 0.0)
             self.seconds[subject][words] = past + perf_counter() - start
 
-    def update(self, fraction: float) -> None:
-        """Say how much of the running stage is done, from 0 to 1."""
-        self.display.update(fraction)
+    def update(self, fraction: float, words: str = "") -> None:
+        """Say how much of the running stage is done, from 0 to 1, and what it is at."""
+        self.display.update(fraction, words)
+
+
+_running: ContextVar[Progress] = ContextVar("running")
+
+
+def running() -> Progress:
+    """Return the progress of the stage that is running, for what is too deep in it to be handed one: a plugin."""
+    return _running.get(Progress())

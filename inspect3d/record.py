@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from inspect3d.arrays import Floats, Integers
+from inspect3d.camera import View
 from inspect3d.deviate.deviation import Deviation
+from inspect3d.figure import Figure
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import Status
 from inspect3d.register.alignment import Alignment, Candidate
@@ -31,6 +33,11 @@ class MeasuredPart:
     verdict : (n,) 0 none, 1 conform, 2 undecided, 3 nonconform, per node; None without a tolerance
     points_cad : (k, 3) mm, the measured points in the CAD frame in the order of the files; None for stereo methods
     point_deviation : (k,) mm, NaN where a point has none
+    noise : mm, standard uncertainty of a measured point; None for stereo methods
+    views : the cameras in the CAD frame; empty for methods without
+    residual : (n,) normalised grey-level residual at the nodes of the mesh, NaN where there is none; None for clouds
+    hidden : the motions that the data cannot tell, in words
+    figures : what the report shows of the way there
     remarks : what was done that the reader must know, a sentence each
     """
 
@@ -47,6 +54,10 @@ class MeasuredPart:
     points_cad: Floats | None = None
     point_deviation: Floats | None = None
     noise: float | None = None
+    views: tuple[View, ...] = ()
+    residual: Floats | None = None
+    hidden: tuple[str, ...] = ()
+    figures: tuple[Figure, ...] = ()
     remarks: tuple[str, ...] = ()
 
 

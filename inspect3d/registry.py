@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import is_dataclass
 from difflib import get_close_matches
 from importlib.metadata import EntryPoint, entry_points
+from types import MappingProxyType
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
@@ -63,7 +64,15 @@ def method(name: str) -> type[Measure]:
     return plugin
 
 
-def build(name: str, settings: Mapping[str, Any], where: str = "") -> Measure:
+def build_for(table: MeasurementTable) -> Measure:
+    """Return the method that a table of the recipe asks for; see `build`."""
+    shared = {"alignment": table.alignment.model_dump(mode="json", exclude_defaults=True)}
+    return build(table.method, table.settings, f"measurements[{table.name!r}]", shared)
+
+
+def build(
+    name: str, settings: Mapping[str, Any], where: str = "", shared: Mapping[str, Any] = MappingProxyType({})
+) -> Measure:
     """Return a method with its settings.
 
     Parameters
@@ -71,6 +80,7 @@ def build(name: str, settings: Mapping[str, Any], where: str = "") -> Measure:
     name : of the method
     settings : from the recipe, less the keys every method shares and the files
     where : the recipe's table, to begin an error with; such as "measurements['laser']"
+    shared : values of keys that every method shares, for a method that has a field of that name
 
     Raises
     ------
@@ -83,6 +93,7 @@ def build(name: str, settings: Mapping[str, Any], where: str = "") -> Measure:
     except InputError as error:
         raise InputError(f"{place}{error}") from error
     known = [setting.name for setting in settings_of(plugin)]
+    settings = {**settings, **{key: value for key, value in shared.items() if key in known}}
     for key in settings:
         if key not in known:
             wrong = unknown(key, [*known, *MeasurementTable.model_fields, *FILE_KEYS])

@@ -28,7 +28,13 @@ def terminal(stream: TextIO) -> Iterator[Progress]:
     from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bars
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn())
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[at]}", markup=False),
+    )
     with Bars(*columns, console=Console(file=stream), transient=True) as bars:
         yield Progress(Live(bars))
 
@@ -42,11 +48,11 @@ class Live:
 
     def begin(self, words: str) -> None:
         """Add a line."""
-        self.tasks.append(self.bars.add_task(words, total=None))
+        self.tasks.append(self.bars.add_task(words, total=None, at=""))
 
-    def update(self, fraction: float) -> None:
+    def update(self, fraction: float, words: str = "") -> None:
         """Fill the bar of the innermost stage."""
-        self.bars.update(self.tasks[-1], total=1.0, completed=fraction)
+        self.bars.update(self.tasks[-1], total=1.0, completed=fraction, at=words)
 
     def end(self) -> None:
         """Take the line away."""
@@ -67,7 +73,7 @@ class Lines:
         timer.start()
         self.timers.append(timer)
 
-    def update(self, fraction: float) -> None:
+    def update(self, fraction: float, words: str = "") -> None:
         """Write nothing: a log has no bars."""
 
     def end(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from inspect3d.correlation.normal import Facets, facets
 from inspect3d.correlation.picture import Interpolation, Pictures, Stack
 from inspect3d.correlation.scene import Scene, scene
 from inspect3d.correlation.shape import Shape
-from inspect3d.correlation.solver import Level, Solver, State, Step, held
+from inspect3d.correlation.solver import COARSE, Level, Solver, State, Step, held
 from inspect3d.correlation.uncertainty import Systematic, uncertainty
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
@@ -89,7 +90,10 @@ class Correlate:
         freedom = freedom or known
         levels = self.levels or (JOINT if freedom.unknowns else SHAPE)
         coarse = levels[:-1] if freedom.unknowns else levels
-        state = Solver(coarse)(seen, pictures, views, freedom, told=told)
+        calibrating = tuple(takewhile(lambda level: level.moves == "cameras", coarse))
+        state = Solver(calibrating, COARSE)(seen, pictures, views, freedom, told=told)
+        calibrated = state.views if calibrating else None
+        state = Solver(coarse[len(calibrating) :])(seen, pictures, state.views, freedom, told=told)
         if freedom.unknowns:  # the cameras have moved, and with them the outline of the part in the pictures
             deviation = np.zeros(len(nominal.mesh))
             deviation[seen.node] = state.deviation
@@ -109,7 +113,7 @@ class Correlate:
         sure = uncertainty(seen, stack, state.views, state.deviation, state.weights, last, self.systematic)
         local = float(np.sqrt(np.median(sure.system.nodal.inverse_diagonal)))
         motions = hidden_motions(seen, sure.system, last, local)
-        return Shape(nominal.mesh, seen, state, sure, motions, found)
+        return Shape(nominal.mesh, seen, state, sure, motions, found, calibrated)
 
     def _scene(self, nominal: Nominal, views: Sequence[View], masks: Sequence[Booleans | None] | None) -> Scene:
         masks = masks or [None] * len(views)

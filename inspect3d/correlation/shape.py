@@ -33,6 +33,7 @@ class Shape:
     uncertainty : of the nodes of the scene
     hidden : motions that the pictures do not show or show weakly
     facets : residuals and correlation of the scene's facets
+    calibrated : the cameras as they were found on the nominal shape, before it moved; None where they were known
     """
 
     mesh: InspectionMesh
@@ -41,6 +42,7 @@ class Shape:
     uncertainty: Uncertainty
     hidden: tuple[HiddenMotion, ...]
     facets: Facets
+    calibrated: tuple[View, ...] | None = None
 
     @property
     def views(self) -> tuple[View, ...]:

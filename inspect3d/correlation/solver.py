@@ -48,12 +48,12 @@ class Step:
 
     Parameters
     ----------
-    level : number of its level
+    level : that it belongs to
     change : largest motion of a node, or of the part before a camera, mm
     noise : root mean squared residual before it, grey levels
     """
 
-    level: int
+    level: Level
     change: float
     noise: float
 
@@ -149,7 +149,7 @@ class Solver:
             change = max(float(np.abs(shape).max()), _reach(scene, cameras, freedom) if level.moves == "cameras" else 0)
             if count >= PATIENCE:
                 factor = max(factor * SHORTER, LEAST) if shape @ last < 0 else min(factor * LONGER, 1.0)
-            step = Step(number, change, float(np.sqrt(noise)))
+            step = Step(level, change, float(np.sqrt(noise)))
             told(step)
             state = State(
                 state.deviation + factor * shape,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,19 +21,22 @@ OFFSET = 3.0  # robust scales that a uniform deviation must have to count as one
 class Gauge:
     """The map that takes the best-fit rigid motion out of a deviation field: G = I - J (J' W J)⁺ J' W.
 
-    Free motions are left alone: the inverse is a pseudo-inverse.
+    Free motions are left alone: the inverse is a pseudo-inverse. Where a method cannot see the scale, the growth of the
+    part is taken out like a motion, as a seventh column of J.
 
     Parameters
     ----------
     nodes, normals : (n, 3) of the observed nodes, mm
     weights : (n,) W, area times robust weight
     offset : mm, uniform deviation that no rigid motion explains; 0 unless it is far larger than the other deviations
+    growth : take out the growth of the part as well
     """
 
     nodes: Floats
     normals: Floats
     weights: Floats
     offset: float = 0.0
+    growth: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", floats(self.weights, "weights", len(self.nodes)))
@@ -50,15 +53,26 @@ class Gauge:
 
     @cached_property
     def jacobian(self) -> Floats:
-        """Return J, (n, 6): the change of each node's deviation under a small motion of the measured points."""
-        return jacobian(self.nodes, self.normals, self.origin)
+        """Return J, (n, 6): the change of each node's deviation under a small motion of the measured points.
+
+        With growth, (n, 7): the last column is the change by a unit of relative growth about `origin`.
+        """
+        rows = jacobian(self.nodes, self.normals, self.origin)
+        if not self.growth:
+            return rows
+        return np.column_stack([rows, ((self.nodes - self.origin) * self.normals).sum(axis=1)])
+
+    @property
+    def _units(self) -> Floats:
+        """What brings turns and growth to the size of shifts, (6,) or (7,)."""
+        return np.array([self.length] * 3 + [1.0] * 3 + [self.length] * self.growth)
 
     @cached_property
     def _spectrum(self) -> tuple[Floats, Floats]:
         """Stiffness of the motions, ascending, and the motions as columns (6, 6); turns in units of `length`."""
-        rows = self.jacobian / np.array([self.length] * 3 + [1.0] * 3)
+        rows = self.jacobian / self._units
         values, vectors = np.linalg.eigh((rows * self.weights[:, None]).T @ rows)
-        return values, vectors / np.array([self.length] * 3 + [1.0] * 3)[:, None]
+        return values, vectors / self._units[:, None]
 
     @cached_property
     def free(self) -> Floats:
@@ -67,12 +81,14 @@ class Gauge:
         They span the null space of J' W J (N. Gelfand & L. J. Guibas, "Shape segmentation using local slippage
         analysis", SGP 2004): stiffness below a thousandth of the stiffest motion's.
         """
+        if self.growth:
+            return replace(self, growth=False).free
         values, vectors = self._spectrum
         return vectors[:, values < FREE * values[-1]].T
 
     @cached_property
     def inverse(self) -> Floats:
-        """Return (J' W J)⁺, (6, 6), with the free directions left out."""
+        """Return (J' W J)⁺, (6, 6) or with growth (7, 7), with the free directions left out."""
         return self._inverse(FREE)
 
     def _inverse(self, least: float) -> Floats:
@@ -82,11 +98,11 @@ class Gauge:
 
     @cached_property
     def solver(self) -> Floats:
-        """Return M = (J' W J)⁺ J' W, (6, n): the rigid motion in a deviation field."""
+        """Return M = (J' W J)⁺ J' W, (6, n) or with growth (7, n): the motion in a deviation field."""
         return self.inverse @ (self.jacobian * self.weights[:, None]).T
 
     def motion(self, values: Floats) -> Floats:
-        """Return the small motion (6,) of the measured points that best undoes a deviation field (n,) mm.
+        """Return the small motion (6,), or with growth (7,), of the points that best undoes a deviation field (n,) mm.
 
         A part that is too large all over, as a ring of too large a diameter, would lean over to fit the better: the
         `offset` it has left when the stiff motions are made does not count for the soft ones.
@@ -105,7 +121,7 @@ class Gauge:
         return independent - 2 * cross + np.einsum("ij,jk,ik->i", self.jacobian, common, self.jacobian)
 
     def covariance(self, residuals: Floats, block: float) -> Floats:
-        """Return the covariance (6, 6) of the motion, from a sandwich over spatial blocks.
+        """Return the covariance of the motion, (6, 6) or with growth (7, 7), from a sandwich over spatial blocks.
 
         Errors within a cube of edge `block` (mm) may correlate as they like; those of different cubes do not.
 
@@ -117,14 +133,16 @@ class Gauge:
         scores = self.jacobian * (self.weights * residuals)[:, None]
         cells = np.floor((self.nodes - self.nodes.min(axis=0)) / block).astype(np.int64)
         _, cell = np.unique(cells, axis=0, return_inverse=True)
-        sums = np.stack([np.bincount(cell.ravel(), scores[:, k]) for k in range(6)], axis=1)
+        sums = np.stack([np.bincount(cell.ravel(), scores[:, k]) for k in range(scores.shape[1])], axis=1)
         determined = np.linalg.matrix_rank(self.inverse)
         blocks = len(sums)
         grow = blocks / max(blocks - determined, 1)
         return grow * self.inverse @ (sums.T @ sums) @ self.inverse
 
 
-def best_fit(nodes: Floats, normals: Floats, areas: Floats, values: Floats, steps: int = 50) -> Gauge:
+def best_fit(
+    nodes: Floats, normals: Floats, areas: Floats, values: Floats, growth: bool = False, steps: int = 50
+) -> Gauge:
     """Return the robust best-fit gauge of a deviation field: Tukey weights on what remains, times the areas.
 
     Parameters
@@ -132,6 +150,7 @@ def best_fit(nodes: Floats, normals: Floats, areas: Floats, values: Floats, step
     nodes, normals : (n, 3)
     areas : (n,) mm²
     values : (n,) mm
+    growth : take out the growth of the part as well
     """
     weights, remains = areas, values
     for _ in range(steps):
@@ -142,10 +161,10 @@ def best_fit(nodes: Floats, normals: Floats, areas: Floats, values: Floats, step
         new = areas * share
         settled = np.abs(new - weights).max() < 1e-4 * areas.max()
         weights = new
-        remains = Gauge(nodes, normals, weights)(values)
+        remains = Gauge(nodes, normals, weights, growth=growth)(values)
         if settled:
             break
-    return Gauge(nodes, normals, weights, _offset(remains, areas))
+    return Gauge(nodes, normals, weights, _offset(remains, areas), growth)
 
 
 def _offset(values: Floats, areas: Floats) -> float:

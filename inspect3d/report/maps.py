@@ -19,6 +19,7 @@ def map_polydata(mesh: InspectionMesh, part: MeasuredPart) -> PolyData:
 
     `deviation` and `sigma` are float64 in mm and NaN where the node is not observed; `observed` and `crease` are
     uint8; `verdict` is int8: 0 none, 1 conform, 2 undecided, 3 nonconform; `Normals` are the outward normals.
+    Stereo methods add `residual`, float64 and NaN where no facet around the node was measured.
 
     Raises
     ------
@@ -37,6 +38,8 @@ def map_polydata(mesh: InspectionMesh, part: MeasuredPart) -> PolyData:
     polydata.point_data["observed"] = observed.astype(np.uint8)
     polydata.point_data["crease"] = mesh.crease.astype(np.uint8)
     polydata.point_data["verdict"] = verdict.astype(np.int8)
+    if part.residual is not None:
+        polydata.point_data["residual"] = np.array(part.residual)
     polydata.point_data.active_normals = np.array(mesh.normals)
     return polydata
 

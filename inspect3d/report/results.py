@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from inspect3d.camera import View
 from inspect3d.compare.tolerances import tolerances
 from inspect3d.deviate.statistics import Statistics, percentiles
 from inspect3d.nominal.nominal import InspectionMesh
@@ -92,9 +93,19 @@ def _measurement(record: Record, mesh: InspectionMesh, part: MeasuredPart) -> di
         "verdict": verdict_shares(record, part) if has_map else None,
         "labels": [_label(reading) for reading in readings(mesh, part, record.recipe.report.labels)],
         "noise": part.noise,
-        "hidden": [],
+        "hidden": list(part.hidden),
+        "cameras": [_camera(view) for view in part.views],
         "remarks": list(part.remarks),
         "seconds": {stage: float(seconds) for stage, seconds in part.seconds.items()},
+    }
+
+
+def _camera(view: View) -> dict[str, Any]:
+    return {
+        "matrix": view.camera.matrix.tolist(),
+        "distortion": view.camera.distortion.tolist(),
+        "size": list(view.camera.size),
+        "camera_from_cad": view.camera_from_cad.matrix.tolist(),
     }
 
 
