@@ -13,7 +13,7 @@ from inspect3d.arrays import Booleans
 from inspect3d.camera import Camera, View
 from inspect3d.correlation.correlate import TWO_STEPS, Correlate
 from inspect3d.correlation.freedom import Freedom, Lens, Poses
-from inspect3d.correlation.illustrated import illustrated
+from inspect3d.correlation.illustrated import MOVES, illustrated
 from inspect3d.correlation.picks import FEWEST, Picks, ideal_camera, placed_by_picks, view_from_dlt
 from inspect3d.correlation.shape import Shape
 from inspect3d.correlation.solver import Step
@@ -309,7 +309,7 @@ def _telling(steps: list[Step]) -> Callable[[Step], None]:
 
     def tell(step: Step) -> None:
         steps.append(step)
-        what = {"cameras": "cameras", "shape": "shape", "both": "cameras and shape"}[step.level.moves]
+        what = MOVES[step.level.moves]
         done = len(steps) / (len(steps) + 10)
         progress.update(done, f"{what}, blur {step.level.blur:g} px, step {len(steps)}: {1000 * step.change:.2g} µm")
 

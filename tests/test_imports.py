@@ -25,6 +25,7 @@ PIPELINE = (
         "system",
         "readable",
         "file_name",
+        "figure",
     },
     {"files"},
     {"nominal"},

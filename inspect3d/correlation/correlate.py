@@ -16,16 +16,20 @@ from inspect3d.correlation.normal import Facets, facets
 from inspect3d.correlation.picture import Interpolation, Pictures, Stack
 from inspect3d.correlation.scene import Scene, scene
 from inspect3d.correlation.shape import Shape
-from inspect3d.correlation.solver import COARSE, Level, Solver, State, Step, held
+from inspect3d.correlation.solver import COARSE, ON_NOMINAL, Level, Solver, State, Step, held
 from inspect3d.correlation.uncertainty import Systematic, uncertainty
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
 
 SHAPE = (Level(6, 1000, 8, "shape"), Level(3, 100, 8, "shape"), Level(1.5, 1, 8, "shape"), Level(0, 0, 20, "shape"))
-CAMERAS = tuple(Level(blur, 0, 15, "cameras") for blur in (6.0, 3.0, 1.5))
-JOINT = (*CAMERAS, Level(3, 1, 8), Level(1.5, 0.1, 8), Level(0, 0, 40))
-TWO_STEPS = (*CAMERAS, Level(0, 0, 20, "cameras"), *SHAPE)
-"""Ways from coarse to fine: shape alone, cameras and shape together, and the paper's two steps."""
+POSES = (Level(6, 0, 15, "poses"), Level(3, 0, 15, "poses"))
+JOINT = (*POSES, Level(6, 100, 8), Level(3, 1, 8), Level(1.5, 0.1, 8), Level(0, 0, 40))
+TWO_STEPS = (*POSES, *(Level(blur, 0, 20, "cameras") for blur in (3.0, 1.5, 0.0)), *SHAPE)
+"""Ways from coarse to fine: shape alone, cameras and shape together, and the paper's two steps.
+
+Of cameras and shape together only the poses are brought near the nominal shape first: lenses that take its true
+deviations for errors of their own would run far off their priors.
+"""
 
 NOISY = 25.0
 STEEPEST_TILT = 0.2
@@ -90,7 +94,7 @@ class Correlate:
         freedom = freedom or known
         levels = self.levels or (JOINT if freedom.unknowns else SHAPE)
         coarse = levels[:-1] if freedom.unknowns else levels
-        calibrating = tuple(takewhile(lambda level: level.moves == "cameras", coarse))
+        calibrating = tuple(takewhile(lambda level: level.moves in ON_NOMINAL, coarse))
         state = Solver(calibrating, COARSE)(seen, pictures, views, freedom, told=told)
         calibrated = state.views if calibrating else None
         state = Solver(coarse[len(calibrating) :])(seen, pictures, state.views, freedom, told=told)

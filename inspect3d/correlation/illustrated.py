@@ -20,7 +20,7 @@ from inspect3d.nominal.nominal import Nominal
 
 WIDEST = 800  # px of a picture in the report
 FINEST = 3  # px of a photograph in one of its residual map's
-MOVES = {"cameras": "cameras", "shape": "shape", "both": "cameras and shape"}
+MOVES = {"poses": "poses", "cameras": "cameras", "shape": "shape", "both": "cameras and shape"}
 
 
 def illustrated(
@@ -49,7 +49,7 @@ def illustrated(
         figures.append(Photograph(f"picture_{k + 1}", words, picture, scale, outline(nominal, view), marks))
     stages = [("start", "at the start", tuple(start), False)]
     if shape.calibrated is not None:
-        stages.append(("calibration", "after the calibration on the nominal shape", shape.calibrated, False))
+        stages.append(("calibration", "after the cameras were fitted to the nominal shape", shape.calibrated, False))
     stages.append(("shape", "after the shape was found", shape.views, True))
     stack = Pictures(grey).blurred(0.0)
     maps = [_residual_map(shape, stack, views, moved, *small[0]) for _, _, views, moved in stages]

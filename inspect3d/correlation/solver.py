@@ -16,12 +16,14 @@ from inspect3d.correlation.linear import noise_of, robust, stiffened, system_of
 from inspect3d.correlation.normal import Facets, facets
 from inspect3d.correlation.picture import Pictures, Stack
 from inspect3d.correlation.scene import Scene
+from inspect3d.correlation.system import NOTHING
 from inspect3d.outcome import MeasurementError
 from inspect3d.register.mobility import spread
 
 SHORTER, LONGER, LEAST, PATIENCE = 0.5, 1.2, 0.02, 4
 COARSE = 5e-4
-Moves = Literal["cameras", "shape", "both"]
+Moves = Literal["poses", "cameras", "shape", "both"]
+ON_NOMINAL = ("poses", "cameras")
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,8 @@ class Level:
     blur : px, standard deviation of the Gaussian over the pictures
     stiffness : of the plate that smooths the shape, in median stiffnesses of a node; 0: none
     steps : at most
-    moves : the cameras with the shape held (paper, eq. 4), the shape with the cameras held (eq. 8), or both at once
+    moves : the cameras with the shape held (paper, eq. 4), or only their poses; the shape with the cameras held
+        (eq. 8); or both at once
     """
 
     blur: float
@@ -132,7 +135,8 @@ class Solver:
         self, scene: Scene, stack: Stack, state: State, freedom: Freedom, number: int, told: Callable[[Step], None]
     ) -> State:
         level = self.levels[number]
-        freedom = freedom if level.moves != "shape" else held(freedom)
+        if level.moves in ("shape", "poses"):
+            freedom = held(freedom, poses=level.moves == "shape")
         points = scene.points.thinned(1 + int(level.blur) ** 2) if level.blur >= 1 else scene.points
         final = number == len(self.levels) - 1
         tolerance = self.tolerance if final else max(self.tolerance, COARSE)
@@ -146,7 +150,9 @@ class Solver:
                 )
             noise = noise_of(found, state.weights, len(scene.nodes))
             shape, cameras = _step(scene, found, noise, state, freedom, level)
-            change = max(float(np.abs(shape).max()), _reach(scene, cameras, freedom) if level.moves == "cameras" else 0)
+            change = max(
+                float(np.abs(shape).max()), _reach(scene, cameras, freedom) if level.moves in ON_NOMINAL else 0
+            )
             if count >= PATIENCE:
                 factor = max(factor * SHORTER, LEAST) if shape @ last < 0 else min(factor * LONGER, 1.0)
             step = Step(level, change, float(np.sqrt(noise)))
@@ -164,9 +170,9 @@ class Solver:
         return state
 
 
-def held(freedom: Freedom) -> Freedom:
-    """Return the freedom of cameras that may not change."""
-    return replace(freedom, poses="known", lenses=tuple(Lens() for _ in freedom.lenses))
+def held(freedom: Freedom, poses: bool = True) -> Freedom:
+    """Return the freedom of cameras whose lenses may not change, nor their poses."""
+    return replace(freedom, poses="known" if poses else freedom.poses, lenses=tuple(Lens() for _ in freedom.lenses))
 
 
 def _step(
@@ -175,9 +181,9 @@ def _step(
     mixing, sigmas = freedom.spread(freedom.columns)
     scale = freedom.scale(state.views, scene.nodes)
     camera_right = mixing.T @ found.camera_right / noise - freedom.offset(state.views) / sigmas**2
-    if level.moves == "cameras":
+    if level.moves in ON_NOMINAL:
         matrix = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)
-        inverse = np.linalg.pinv(matrix * scale * scale[:, None], 1e-10, hermitian=True)
+        inverse = np.linalg.pinv(matrix * scale * scale[:, None], NOTHING, hermitian=True)
         return np.zeros(len(scene.nodes)), scale * (inverse @ (scale * camera_right))
     factors = state.weights * found.clean
     system = system_of(scene, found, factors, noise, freedom, freedom.columns, scale, level.stiffness)

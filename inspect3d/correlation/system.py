@@ -11,7 +11,7 @@ from scipy import sparse
 from inspect3d.arrays import Floats
 from inspect3d.correlation.factor import Factor
 
-NOTHING = 1e-11
+NOTHING = 2e-14
 
 
 @dataclass(frozen=True, eq=False)
