@@ -59,7 +59,7 @@ def illustrated(
             PixelMap(
                 f"residual_{name}",
                 f"Grey-level residual {words}, over picture 1",
-                "Difference of the pictures, grey levels",
+                "Difference, grey levels",
                 small[0][0],
                 small[0][1],
                 values,

@@ -21,6 +21,7 @@ from inspect3d.report.colours import (
     symmetric_limits,
 )
 from inspect3d.report.digits import COVERAGE, decimals, number
+from inspect3d.report.figures import draw_figure
 from inspect3d.report.histogram import draw_histogram
 from inspect3d.report.layout import Layout
 from inspect3d.report.picture import Caption, Picture
@@ -133,6 +134,14 @@ def _draw_measurement(record: Record, part: MeasuredPart, folder: Path, views: V
         file = f"{part.name}_histogram.png"
         draw_histogram(folder / file, values, areas, scale, caption, table.tolerance, Layout(*SIZE))
         shown.append(Shown(file, "Histogram of the deviations"))
+    if part.residual is not None:
+        values = np.where(deviation.observed, part.residual, np.nan)
+        scale = rising_scale("Residual", "", rising_limits(values[deviation.observed], mesh.areas[deviation.observed]))
+        shown += pictures("residual", "Grey-level residual, normalised", values, scale, viewpoints[:1])
+    for figure in part.figures:
+        file = f"{part.name}_{figure.name}.png"
+        draw_figure(folder / file, figure, table.name, part.name, Layout(*SIZE))
+        shown.append(Shown(file, figure.words))
     return shown
 
 
