@@ -116,13 +116,7 @@ class Freedom:
         return tuple(names)
 
     def scale(self, views: Sequence[View], points: Floats) -> Floats:
-        """Return the unit of each unknown, (m,), in which their stiffnesses compare.
-
-        That is the standard uncertainty of its prior; where it has none, the change that moves the pictures of points
-        (n, 3) mm as far as the vaguest prior lets them move, at least by one pixel rms. What only the priors determine
-        then has a stiffness of about one, and does not drown in the rounding errors of what the pictures determine.
-        """
-        sigmas = self.spread(self.columns)[1]
+        """Return the change of each unknown that moves the pictures of points (n, 3) mm by one pixel rms, (m,)."""
         places = np.concatenate([view.project(points) for view in views])
         found = np.empty(self.unknowns)
         for k, size in enumerate(self._trials):
@@ -130,9 +124,7 @@ class Freedom:
             step[k] = size
             moved = np.concatenate([view.project(points) for view in self.moved(views, step)])
             found[k] = size / np.sqrt(((moved - places) ** 2).sum(axis=1).mean())
-        known = np.isfinite(sigmas)
-        vaguest = max(1.0, float(np.max(sigmas[known] / found[known], initial=0.0)))
-        return np.where(known, sigmas, vaguest * found)
+        return found
 
     @property
     def _trials(self) -> list[float]:

@@ -9,7 +9,7 @@ import numpy as np
 from inspect3d.arrays import Floats
 from inspect3d.correlation.freedom import Freedom
 from inspect3d.correlation.scene import Scene
-from inspect3d.correlation.system import NOTHING, System
+from inspect3d.correlation.system import System
 from inspect3d.register.mobility import named, spread
 
 LOUD = 0.5
@@ -55,9 +55,7 @@ def hidden_motions(scene: Scene, system: System, freedom: Freedom, local: float)
         words = "growth of the whole part: the scale is not known"
         found.append(HiddenMotion(words, growth / size if size > 0 else growth, np.inf, 0.0))
     found += _unseen(scene, system, freedom)
-    values, modes = system.spectrum
-    seen = values > NOTHING
-    factor = modes[:, seen] / np.sqrt(values[seen])
+    factor = system.camera_factor
     if not factor.size:
         return tuple(found)
     patterns, sizes, mixes = np.linalg.svd(system.following @ factor, full_matrices=False)
@@ -88,8 +86,12 @@ def _unseen(scene: Scene, system: System, freedom: Freedom) -> list[HiddenMotion
     motions = basis / np.array([length] * 3 + [1.0] * 3)
     flat = np.zeros(len(scene.nodes))
     words = [f"{motion.words}: the surface stays in itself" for motion in named(motions, scene.centre, length)]
-    words += ["a change of the cameras against each other that the pictures do not show"] * int((~as_one).sum())
-    return [HiddenMotion(w, flat, np.inf, 0.0) for w in words]
+    found = [HiddenMotion(w, flat, np.inf, 0.0) for w in words]
+    apart_words = "a change of the cameras against each other that the pictures do not show"
+    for pattern in (system.following @ unseen[~as_one].T).T:
+        size = np.sqrt((pattern**2).mean())
+        found.append(HiddenMotion(apart_words, pattern / size if size > 0 else flat, np.inf, 0.0))
+    return found
 
 
 def _words(cameras: Floats, freedom: Freedom) -> str:

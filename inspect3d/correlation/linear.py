@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from inspect3d.arrays import Floats, Integers
+from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.system import System
+from inspect3d.register.gauge import FREE
 from inspect3d.register.mobility import jacobian, spread
 
 SUPPORT = 1e-6
@@ -32,17 +36,42 @@ def gauge_of(scene: Scene, freedom: Freedom) -> Floats:
     """Return orthonormal columns (n, g) of the fields that the unknown poses can imitate.
 
     They are the motions of the part as a whole and, where each camera has a pose of its own, its growth. What leaves
-    the surface in itself is not among them.
+    the surface in itself is not among them; see `slides_of`.
     """
-    n = len(scene.nodes)
     if freedom.poses == "known":
-        return np.zeros((n, 0))
-    length = spread(scene.nodes, np.ones(n), scene.centre)
-    rows = jacobian(scene.nodes, scene.normals, scene.centre) / np.array([length] * 3 + [1.0] * 3)
+        return np.zeros((len(scene.nodes), 0))
+    left, values, _ = _motions(scene, freedom)
+    return left[:, values**2 > FREE * values[0] ** 2]
+
+
+def slides_of(scene: Scene, freedom: Freedom, views: Sequence[View]) -> Floats:
+    """Return the changes of the cameras (m, s) that only let the surface slide in itself.
+
+    The pictures say nothing about them, whatever stiffness the facets of the mesh seem to give them: they are held.
+    """
+    if freedom.poses == "known":
+        return np.zeros((freedom.unknowns, 0))
+    _, values, right = _motions(scene, freedom)
+    motions = right[values**2 <= FREE * values[0] ** 2]
+    motions[:, 3:6] += np.cross(motions[:, :3], freedom.origin - scene.centre)
+    bodies = 1 if freedom.poses == "common" else len(views)
+    slides = np.zeros((freedom.unknowns, len(motions)))
+    for k in range(bodies):
+        slides[6 * k : 6 * k + 6] = motions[:, :6].T
+        if freedom.poses == "free":  # growth by g about the centre looks like a shift by -g (centre - camera)
+            slides[6 * k + 3 : 6 * k + 6] -= np.outer(scene.centre - views[k].centre, motions[:, 6])
+    return slides
+
+
+def _motions(scene: Scene, freedom: Freedom) -> tuple[Floats, Floats, Floats]:
+    """Return the singular values of the normal motions (n, 6) or, with growth, (n, 7); the fields; the motions."""
+    length = spread(scene.nodes, np.ones(len(scene.nodes)), scene.centre)
+    units = np.array([length] * 3 + [1.0] * 3 + [length] * (freedom.poses == "free"))
+    rows = jacobian(scene.nodes, scene.normals, scene.centre)
     if freedom.poses == "free":
-        rows = np.column_stack([rows, ((scene.nodes - scene.centre) * scene.normals).sum(axis=1) / length])
-    left, values, _ = np.linalg.svd(rows, full_matrices=False)
-    return left[:, values > 1e-6 * values[0]]
+        rows = np.column_stack([rows, ((scene.nodes - scene.centre) * scene.normals).sum(axis=1)])
+    left, values, right = np.linalg.svd(rows / units, full_matrices=False)
+    return left, values, right / units
 
 
 def stiffened(scene: Scene, values: Floats, stiffness: float) -> tuple[Floats, Floats]:
@@ -71,6 +100,7 @@ def system_of(
     freedom: Freedom,
     columns: Integers,
     scale: Floats,
+    slides: Floats,
     stiffness: float = 0.0,
 ) -> System:
     """Return the normal equations.
@@ -81,11 +111,12 @@ def system_of(
     noise : variance of the residuals, grey levels²
     columns : camera parameters of each view in `found`
     scale : (m,) of each camera unknown, what moves the pictures by one pixel; see `Freedom.scale`
+    slides : (m, s), see `slides_of`
     stiffness : see `stiffened`
     """
     values, _ = stiffened(scene, scene.assembled(found.node * (factors / noise)[:, None, None]), stiffness)
     nodal, gauge = scene.ordering.factor(values), gauge_of(scene, freedom)
     mixing, sigmas = freedom.spread(columns)
     cross = scene.gathered(found.cross * (factors / noise)[:, None, None]) @ mixing
-    camera = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)
-    return System(nodal, cross, camera, gauge, scale)
+    camera = mixing.T @ found.camera @ mixing / noise
+    return System(nodal, cross, camera, gauge, 1 / sigmas**2, scale, slides)

@@ -12,16 +12,16 @@ from scipy import sparse
 from inspect3d.arrays import Floats
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom, Lens
-from inspect3d.correlation.linear import noise_of, robust, stiffened, system_of
+from inspect3d.correlation.linear import noise_of, robust, slides_of, stiffened, system_of
 from inspect3d.correlation.normal import Facets, facets
 from inspect3d.correlation.picture import Pictures, Stack
 from inspect3d.correlation.scene import Scene
-from inspect3d.correlation.system import NOTHING
 from inspect3d.outcome import MeasurementError
 from inspect3d.register.mobility import spread
 
 SHORTER, LONGER, LEAST, PATIENCE = 0.5, 1.2, 0.02, 4
 COARSE = 5e-4
+VAGUE = 1e-6  # share of the stiffest motion's stiffness; softer ones are held while the shape is
 Moves = Literal["poses", "cameras", "shape", "both"]
 ON_NOMINAL = ("poses", "cameras")
 
@@ -179,14 +179,15 @@ def _step(
     scene: Scene, found: Facets, noise: float, state: State, freedom: Freedom, level: Level
 ) -> tuple[Floats, Floats]:
     mixing, sigmas = freedom.spread(freedom.columns)
-    scale = freedom.scale(state.views, scene.nodes)
+    scale, slides = freedom.scale(state.views, scene.nodes), slides_of(scene, freedom, state.views)
     camera_right = mixing.T @ found.camera_right / noise - freedom.offset(state.views) / sigmas**2
     if level.moves in ON_NOMINAL:
         matrix = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)
-        inverse = np.linalg.pinv(matrix * scale * scale[:, None], NOTHING, hermitian=True)
-        return np.zeros(len(scene.nodes)), scale * (inverse @ (scale * camera_right))
+        firm = np.linalg.svd(slides / scale[:, None])[0][:, slides.shape[1] :] * scale[:, None]
+        inverse = firm @ np.linalg.pinv(firm.T @ matrix @ firm, VAGUE, hermitian=True) @ firm.T
+        return np.zeros(len(scene.nodes)), inverse @ camera_right
     factors = state.weights * found.clean
-    system = system_of(scene, found, factors, noise, freedom, freedom.columns, scale, level.stiffness)
+    system = system_of(scene, found, factors, noise, freedom, freedom.columns, scale, slides, level.stiffness)
     right = scene.gathered(found.right * (state.weights / noise)[:, None])
     if level.stiffness > 0:
         _, plate = stiffened(scene, scene.assembled(found.node * (factors / noise)[:, None, None]), level.stiffness)

@@ -11,15 +11,15 @@ from scipy import sparse
 from inspect3d.arrays import Floats
 from inspect3d.correlation.factor import Factor
 
-NOTHING = 2e-14
+NOTHING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """K u + B p = b, B'u + S p = s, subject to C'u = 0.
+    """K u + B p = b, B'u + (S + P) p = s, subject to C'u = 0.
 
-    With K̃ = K⁻¹ - K⁻¹C (C'K⁻¹C)⁻¹ C'K⁻¹ and X = K̃B, the cameras have the reduced matrix R = S - B'X. What it
-    leaves free, motions that no picture shows, is held.
+    With K̃ = K⁻¹ - K⁻¹C (C'K⁻¹C)⁻¹ C'K⁻¹ and X = K̃B, the pictures give the cameras the reduced matrix R = S - B'X,
+    to which the priors add P. What both leave free, motions that no picture shows, is held.
 
     Parameters
     ----------
@@ -27,14 +27,18 @@ class System:
     cross : B (n, m), for m unknowns of the cameras, which may be none
     camera : S (m, m)
     gauge : C (n, g), orthonormal columns, which may be none
+    prior : (m,) the diagonal of P
     scale : (m,) the units of the unknowns p in which their stiffnesses compare
+    slides : (m, s) changes of the cameras that are held
     """
 
     nodal: Factor
     cross: Floats
     camera: Floats
     gauge: Floats
+    prior: Floats
     scale: Floats
+    slides: Floats
 
     @cached_property
     def held(self) -> tuple[Floats, Floats]:
@@ -54,29 +58,51 @@ class System:
 
     @cached_property
     def reduced(self) -> Floats:
-        """Return R, (m, m)."""
-        return self.camera - self.cross.T @ self.following
+        """Return R, (m, m), symmetric."""
+        reduced = self.camera - self.cross.T @ self.following
+        return (reduced + reduced.T) / 2
 
     @cached_property
-    def spectrum(self) -> tuple[Floats, Floats]:
-        """Return the eigenvalues of R in units of `scale`, ascending, over the largest one of S, and the modes of p."""
+    def _modes(self) -> tuple[Floats, Floats]:
+        """Return modes of the cameras (m, k) that pictures or priors tell about, and (m, l) those neither does.
+
+        In the first, R + P has a diagonal of about ones.
+        """
+        if not len(self.scale):
+            return np.zeros((0, 0)), np.zeros((0, 0))
         both = self.scale * self.scale[:, None]
-        stiffest = float(np.linalg.eigvalsh(self.camera * both)[-1]) if len(self.scale) else 1.0
-        values, vectors = np.linalg.eigh(self.reduced * both / stiffest)
-        return values, vectors * self.scale[:, None] / np.sqrt(stiffest)
+        slides = np.linalg.qr(self.slides / self.scale[:, None])[0]
+        others = np.linalg.qr(np.column_stack([slides, np.eye(len(slides))]))[0][:, slides.shape[1] :]
+        values, modes = np.linalg.eigh(others.T @ (self.reduced * both) @ others)
+        modes = others @ modes
+        silent = values <= NOTHING * float(np.linalg.eigvalsh(self.camera * both)[-1])
+        prior = self.prior * self.scale**2
+        told, turns = np.linalg.eigh((modes[:, silent].T * prior) @ modes[:, silent])
+        modes[:, silent] = modes[:, silent] @ turns
+        values = np.maximum(values, 0.0) + (prior[:, None] * modes**2).sum(axis=0)
+        unseen = silent.copy()
+        unseen[silent] = told <= NOTHING * prior.max()
+        modes = self.scale[:, None] * modes
+        hidden = np.column_stack([self.scale[:, None] * slides, modes[:, unseen]])
+        return modes[:, ~unseen] / np.sqrt(values[~unseen]), hidden
 
     @property
     def unseen(self) -> Floats:
         """Return the motions of the cameras that change no picture beyond what the shape makes up for, (k, m)."""
-        values, modes = self.spectrum
-        return modes[:, values <= NOTHING].T
+        return self._modes[1].T
+
+    @cached_property
+    def camera_factor(self) -> Floats:
+        """Return F (m, k) with F F' = (R + P)⁺."""
+        seen = self._modes[0]
+        turned = seen.T @ ((self.reduced + np.diag(self.prior)) @ seen)
+        values, modes = np.linalg.eigh(turned)
+        return seen @ (modes / np.sqrt(values))
 
     @cached_property
     def camera_covariance(self) -> Floats:
-        """Return R⁺, (m, m)."""
-        values, modes = self.spectrum
-        seen = values > NOTHING
-        return (modes[:, seen] / values[seen]) @ modes[:, seen].T
+        """Return (R + P)⁺, (m, m)."""
+        return self.camera_factor @ self.camera_factor.T
 
     def solve(self, right: Floats, camera_right: Floats) -> tuple[Floats, Floats]:
         """Return the nodal motions u and camera unknowns p for right-hand sides b (n,) and s (m,), or more columns."""

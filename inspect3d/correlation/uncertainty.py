@@ -12,7 +12,7 @@ from scipy import sparse
 from inspect3d.arrays import Floats, Integers
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
-from inspect3d.correlation.linear import noise_of, system_of
+from inspect3d.correlation.linear import noise_of, slides_of, system_of
 from inspect3d.correlation.normal import Facets, facets
 from inspect3d.correlation.picture import Stack
 from inspect3d.correlation.scene import Scene
@@ -99,10 +99,10 @@ def uncertainty(
     found = facets(scene, stack, views, deviation, weights, columns, power=2, whole=systematic is not None)
     noise = noise_of(found, weights, len(scene.nodes) + freedom.unknowns)
     factors = weights * found.clean**2
-    scale = freedom.scale(views, scene.nodes)
-    first = system_of(scene, found, factors, noise, freedom, columns, scale)
+    scale, slides = freedom.scale(views, scene.nodes), slides_of(scene, freedom, views)
+    first = system_of(scene, found, factors, noise, freedom, columns, scale, slides)
     correlated = _correlated(scene, found, weights / noise, first, freedom.spread(columns)[0])
-    system = system_of(scene, found, factors, noise * correlated, freedom, columns, scale)
+    system = system_of(scene, found, factors, noise * correlated, freedom, columns, scale, slides)
     shifts = np.zeros((len(scene.nodes), 0))
     if systematic is not None:
         shares = weights * found.clean / (noise * correlated)
