@@ -221,6 +221,7 @@ def _of_nodes(
         views=found.views,
         residual=measurement.residual,
         hidden=measurement.hidden,
+        contributions=measurement.contributions,
         figures=measurement.figures,
         remarks=remarks,
     )

@@ -126,6 +126,7 @@ class NodalMeasurement:
     views : the cameras in the CAD frame, if it has any
     residual : (n,) normalised grey-level residual at every node of the mesh, NaN where there is none
     hidden : the motions that the data cannot tell, in words
+    contributions : to the uncertainty: source, size with its unit, and how it enters
     figures : what the report shows of the way there
     remarks : what the report must say, a sentence each
     """
@@ -140,6 +141,7 @@ class NodalMeasurement:
     views: tuple[View, ...] = ()
     residual: Floats | None = None
     hidden: tuple[str, ...] = ()
+    contributions: tuple[tuple[str, str, str], ...] = ()
     figures: tuple[Figure, ...] = ()
     remarks: tuple[str, ...] = ()
 

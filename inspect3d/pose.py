@@ -64,6 +64,11 @@ class Pose:
         """Return the angle of the rotation, rad."""
         return float(Rotation.from_matrix(self.rotation).magnitude())
 
+    @property
+    def rotation_vector(self) -> Floats:
+        """Return the rotation as its axis times its angle, (3,) rad."""
+        return floats(Rotation.from_matrix(self.rotation).as_rotvec(), "rotation vector", 3)
+
     def inverse(self) -> Pose:
         """Return the motion back: `a_from_b` of `b_from_a`."""
         return Pose(self.rotation.T, -self.rotation.T @ self.translation)

@@ -37,6 +37,7 @@ class MeasuredPart:
     views : the cameras in the CAD frame; empty for methods without
     residual : (n,) normalised grey-level residual at the nodes of the mesh, NaN where there is none; None for clouds
     hidden : the motions that the data cannot tell, in words
+    contributions : of the method to the uncertainty: source, size with its unit, and how it enters
     figures : what the report shows of the way there
     remarks : what was done that the reader must know, a sentence each
     """
@@ -57,6 +58,7 @@ class MeasuredPart:
     views: tuple[View, ...] = ()
     residual: Floats | None = None
     hidden: tuple[str, ...] = ()
+    contributions: tuple[tuple[str, str, str], ...] = ()
     figures: tuple[Figure, ...] = ()
     remarks: tuple[str, ...] = ()
 

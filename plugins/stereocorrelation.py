@@ -12,7 +12,7 @@ import numpy as np
 from inspect3d.arrays import Booleans
 from inspect3d.camera import Camera, View
 from inspect3d.correlation.correlate import TWO_STEPS, Correlate
-from inspect3d.correlation.freedom import Freedom, Lens, Poses
+from inspect3d.correlation.freedom import Freedom, Lens, Poses, Stand
 from inspect3d.correlation.illustrated import MOVES, illustrated
 from inspect3d.correlation.picks import FEWEST, Picks, ideal_camera, placed_by_picks, view_from_dlt
 from inspect3d.correlation.shape import Shape
@@ -31,6 +31,7 @@ from inspect3d.recipe import Start
 ROUGH, WIDE = 0.05, 0.3  # relative uncertainty of a focal length that is given, and of one that the picks gave
 CENTRE = 0.025  # of the picture's width: uncertainty of a principal point that is taken to be in the middle
 DISTORTION = (0.2, 0.3, 1e-3, 1e-3, 0.0)  # uncertainties of k1, k2, p1, p2, k3 of a lens nobody calibrated
+LOUD = 0.1  # px, disagreement of the pictures that the reader must hear of
 PATCH = 0.125  # of the part's size: length over which the systematic shift of a picture stays alike
 
 
@@ -174,6 +175,7 @@ class Stereocorrelation:
             views=shape.views,
             residual=shape.residual,
             hidden=tuple(motion.words for motion in shape.hidden),
+            contributions=_contributions(shape),
             figures=illustrated(nominal, shape, begin.views, grey, steps, begin.picks),
             remarks=(*source.remarks, *begin.remarks, *_remarks(shape)),
         )
@@ -237,18 +239,25 @@ class Stereocorrelation:
         rig_view = placed[0] if placed else None
         if rig_view is not None:
             rig_view = View(rig_view.camera, rig_view.camera_from_cad @ self._rig_from_cad().inverse())
-        start = placed
+        start, prior_views = placed, placed
+        stands = _stands(rig) if placed else ()
         if picks is not None and poses != "known":
             priors = tuple(View(camera, Pose.identity()) for camera in cameras)
             freedom = Freedom(poses, lenses, priors, picks.points_cad.mean(axis=0))
             found = placed_by_picks(picks, placed or (), cameras, freedom)
             start = found.views
+            prior_views = _rig_before(placed, start[0]) if placed else start
             errors = np.sqrt((found.errors**2).mean())
             remarks += (f"The cameras started from {len(picks)} landmarks, which fit within {errors:.2g} px rms.",)
         if start is None:
             raise MeasurementError("There are no landmarks to place the cameras by.")
-        priors = tuple(View(camera, view.camera_from_cad) for camera, view in zip(cameras, start, strict=True))
-        return Begin(start, Freedom(poses, lenses, priors, origin), rig_view, picks, remarks)
+        priors = tuple(map(View, cameras, (view.camera_from_cad for view in prior_views or start)))
+        datum = (0.0, 0.0, 0.0)
+        if rig_view is not None:
+            cad_from_rig = priors[0].camera_from_cad.inverse() @ rig_view.camera_from_cad
+            x, y, z = cad_from_rig.translation
+            datum = (float(x), float(y), float(z))
+        return Begin(start, Freedom(poses, lenses, priors, origin, stands, datum), rig_view, picks, remarks)
 
     def _picks(self) -> Picks | None:
         if not self.landmarks:
@@ -297,6 +306,20 @@ def _places(rig: Rig | None) -> tuple[View, ...] | None:
     return tuple(map(View, rig.cameras, poses)) if poses else None
 
 
+def _stands(rig: Rig | None) -> tuple[Stand, ...]:
+    """Return how well the places of the cameras are known; empty where the calibration states no uncertainty."""
+    stands = (
+        tuple(Stand(sigma.rotation, sigma.translation) if sigma else Stand() for sigma in rig.sigmas) if rig else ()
+    )
+    return stands if any(stand.sigmas.any() for stand in stands) else ()
+
+
+def _rig_before(rig: tuple[View, ...], first: View) -> tuple[View, ...]:
+    """Return the views of a rig moved so that its first one stands where `first` does."""
+    moved = rig[0].camera_from_cad.inverse() @ first.camera_from_cad
+    return tuple(View(view.camera, view.camera_from_cad @ moved) for view in rig)
+
+
 def _lens(sigma: CameraSigma | None) -> Lens:
     if sigma is None:
         return Lens()
@@ -316,8 +339,35 @@ def _telling(steps: list[Step]) -> Callable[[Step], None]:
     return tell
 
 
+def _contributions(shape: Shape) -> tuple[tuple[str, str, str], ...]:
+    """Return what the uncertainty of a shape is made of: source, size with its unit, and how it enters."""
+    sure, systematic = shape.uncertainty, shape.systematic
+    found = [
+        (
+            "noise of the pictures",
+            f"{np.sqrt(sure.noise):.2g} grey levels",
+            f"by what the fit leaves over, propagated to every node; times {sure.correlated:.2f} for being correlated",
+        )
+    ]
+    if systematic is not None:
+        words = f"a smooth shift of each picture that no camera model explains, alike over {systematic.length:.3g} mm"
+        found.append(("systematic shift of the pictures", f"{systematic.size:.2g} px", words))
+    weak = [motion for motion in shape.hidden if np.isfinite(motion.sigma)]
+    if weak:
+        size = 1000 * float(np.sqrt(sum(motion.sigma**2 for motion in weak)))
+        words = "motions that the pictures tell weakly, which the priors of the cameras bound; named below"
+        found.append(("cameras", f"{size:.2g} µm rms over the map", words))
+    return tuple(found)
+
+
 def _remarks(shape: Shape) -> tuple[str, ...]:
     remarks = []
+    if shape.systematic is not None and shape.systematic.size > LOUD:
+        remarks.append(
+            f"Across the epipolar lines, where no shape can make up for it, the pictures disagree by "
+            f"{shape.systematic.size:.2g} px: the calibration is not as good as it is said to be. State its "
+            "uncertainty (`sigma`), or calibrate again."
+        )
     if not shape.settled:
         remarks.append(
             f"The solver stopped after {len(shape.state.steps)} steps of its last stage, before the shape had settled: "

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import takewhile
 
 import numpy as np
 
 from inspect3d.arrays import Booleans, Floats
 from inspect3d.camera import View
+from inspect3d.correlation.disagreement import disagreement
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.hidden import hidden_motions
 from inspect3d.correlation.normal import Facets, facets
@@ -50,7 +51,8 @@ class Correlate:
     lifted : evaluation points on the nominal surface; else on flat facets as in the paper, wrong by the chord
     steepest : degrees, largest angle between a normal and the line of sight
     poorest : least correlation coefficient of a facet that counts
-    systematic : a smooth systematic shift of the pictures, carried into the uncertainty
+    systematic : a smooth systematic shift of the pictures, carried into the uncertainty; where the pictures disagree by
+        more than it explains, by as much as they do
     """
 
     levels: tuple[Level, ...] | None = None
@@ -114,10 +116,14 @@ class Correlate:
             seen, node = seen.restricted(good)
             state = Solver(levels[-1:])(seen, pictures, state.views, freedom, state.deviation[node], told)
         found = _found(seen, stack, state, last)
-        sure = uncertainty(seen, stack, state.views, state.deviation, state.weights, last, self.systematic)
+        systematic = self.systematic
+        if systematic is not None:
+            floor = disagreement(seen, stack, state.views, state.deviation)
+            systematic = replace(systematic, size=max(systematic.size, floor))
+        sure = uncertainty(seen, stack, state.views, state.deviation, state.weights, last, systematic)
         local = float(np.sqrt(np.median(sure.system.nodal.inverse_diagonal)))
         motions = hidden_motions(seen, sure.system, last, local)
-        return Shape(nominal.mesh, seen, state, sure, motions, found, calibrated)
+        return Shape(nominal.mesh, seen, state, sure, motions, found, calibrated, systematic)
 
     def _scene(self, nominal: Nominal, views: Sequence[View], masks: Sequence[Booleans | None] | None) -> Scene:
         masks = masks or [None] * len(views)

@@ -13,6 +13,7 @@ from inspect3d.camera import View
 from inspect3d.pose import Pose
 
 POSE, LENS = 6, 9
+EXACT = 1e-9  # rad or mm
 DISTORTION = ("k1", "k2", "p1", "p2", "k3")
 Poses = Literal["known", "common", "free"]
 
@@ -38,9 +39,28 @@ class Lens:
         return np.array([self.focal, self.centre, self.centre, *self.distortion])
 
 
+@dataclass(frozen=True)
+class Stand:
+    """How well the place of a camera is known: standard uncertainties, 0 is exact.
+
+    Parameters
+    ----------
+    turn : rad, of each component of a small turn about the origin of the frame that the place is stated in
+    shift : mm, of each component of a shift
+    """
+
+    turn: float = 0.0
+    shift: float = 0.0
+
+    @property
+    def sigmas(self) -> Floats:
+        """Return the uncertainties of three turns and three shifts, (6,)."""
+        return np.array([self.turn] * 3 + [self.shift] * 3)
+
+
 @dataclass(frozen=True, eq=False)
 class Freedom:
-    """The unknowns of the cameras, and the priors of their lenses.
+    """The unknowns of the cameras, and the priors of their lenses and places.
 
     A pose is changed by a small motion of the part in the CAD frame, about `origin`, before it is photographed: turns
     and shifts (rad, mm). A lens is changed by (focal, cx, cy, k1, k2, p1, p2, k3).
@@ -49,17 +69,23 @@ class Freedom:
     ----------
     poses : "known"; "common", the cameras are a known rig but the part's place in it is not; "free", each by itself
     lenses : of each view
-    priors : the views as they were believed to be beforehand; of these the lenses count
+    priors : the views as they were believed to be beforehand; their poses count where there are `stands`
     origin : (3,) mm
+    stands : of each view, where its place in the rig or before the part is not exact; none: all are
+    datum : (3,) mm, the origin of the frame in which the stands are stated
     """
 
     poses: Poses
     lenses: tuple[Lens, ...]
     priors: tuple[View, ...]
     origin: Floats
+    stands: tuple[Stand, ...] = ()
+    datum: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "origin", floats(self.origin, "origin", 3))
+        if self.stands and (len(self.stands) != len(self.priors) or self.poses == "free"):
+            raise ValueError("stands belong to views whose places are known, one to each")
         if len(self.lenses) != len(self.priors):
             raise ValueError(f"{len(self.lenses)} lenses are given for {len(self.priors)} views")
 
@@ -68,7 +94,8 @@ class Freedom:
         """Return the parameters of a view that the kernel must differentiate by, in its numbering."""
         open_lens = np.any([lens.sigmas > 0 for lens in self.lenses], axis=0)
         lens = [*((6, 7) if open_lens[0] else ()), *(7 + k for k in range(1, 8) if open_lens[k])]
-        return np.array([*(range(POSE) if self.poses != "known" else ()), *lens], dtype=np.int64)
+        moving = self.poses != "known" or any(stand.sigmas.any() for stand in self.stands)
+        return np.array([*(range(POSE) if moving else ()), *lens], dtype=np.int64)
 
     @property
     def unknowns(self) -> int:
@@ -89,6 +116,13 @@ class Freedom:
                     row[list(body), at[motion]] = 1.0
                     rows.append(row)
                     sigmas.append(np.inf)
+        for k, motion, sigma in self._loose:
+            row = np.zeros((views, c))
+            row[k, at[motion]] = 1.0
+            if motion < 3:  # a turn about the datum shifts the origin
+                row[k, [at[3], at[4], at[5]]] = np.cross(np.eye(3)[motion], self.origin - np.array(self.datum))
+            rows.append(row)
+            sigmas.append(sigma)
         for k, lens in enumerate(self.lenses):
             matrix = self.priors[k].camera.matrix
             for number, sigma in enumerate(lens.sigmas):
@@ -110,6 +144,7 @@ class Freedom:
         motions = [f"{kind} {axis}" for kind in ("turn about", "shift along") for axis in "xyz"]
         bodies = {"known": (), "common": ("the part",), "free": tuple(f"view {k + 1}" for k in range(len(self.lenses)))}
         names = [f"{motion} of {body}" for body in bodies[self.poses] for motion in motions]
+        names += [f"{motions[motion]} of view {k + 1}" for k, motion, _ in self._loose]
         parts = ("focal length", "principal point x", "principal point y", *(f"distortion {c}" for c in DISTORTION))
         for k, lens in enumerate(self.lenses):
             names += [f"{part} of view {k + 1}" for part, sigma in zip(parts, lens.sigmas, strict=True) if sigma > 0]
@@ -138,6 +173,32 @@ class Freedom:
         changes = (spread @ step).reshape(len(views), -1)
         return tuple(self._moved(view, change) for view, change in zip(views, changes, strict=True))
 
+    @property
+    def _loose(self) -> list[tuple[int, int, float]]:
+        """View, motion and standard uncertainty of every motion that a stand leaves a little freedom."""
+        return [
+            (k, motion, float(sigma))
+            for k, stand in enumerate(self.stands)
+            for motion, sigma in enumerate(stand.sigmas)
+            if sigma > 0
+        ]
+
+    def _moved_stands(self, views: Sequence[View]) -> Floats:
+        """Return how far each view has moved from its prior, (v, 6), about the datum.
+
+        Of a rig whose place before the part is unknown, the motion of all views together does not count: the one that
+        suits the priors best is taken out.
+        """
+        datum = np.array(self.datum)
+        moved = np.empty((len(views), POSE))
+        for row, view, prior in zip(moved, views, self.priors, strict=True):
+            motion = prior.camera_from_cad.inverse() @ view.camera_from_cad
+            row[:3], row[3:] = motion.rotation_vector, motion(datum[None])[0] - datum
+        if self.poses == "common":
+            weights = 1 / np.maximum([stand.sigmas for stand in self.stands], EXACT) ** 2
+            moved -= (weights * moved).sum(axis=0) / weights.sum(axis=0)
+        return moved
+
     def _moved(self, view: View, change: Floats) -> View:
         matrix = view.camera.matrix + np.array(
             [[change[6], 0.0, change[8]], [0.0, change[7], change[9]], [0.0, 0.0, 0.0]]
@@ -146,10 +207,13 @@ class Freedom:
         return View(camera, view.camera_from_cad @ Pose.small(change[:6], self.origin))
 
     def offset(self, views: Sequence[View]) -> Floats:
-        """Return how far the unknowns (m,) lie from their priors; zero for poses, which have none."""
+        """Return how far the unknowns (m,) lie from their priors; zero for poses that have none."""
         found: list[float] = []
         if self.poses != "known":
             found += [0.0] * (POSE * (1 if self.poses == "common" else len(views)))
+        if self.stands:
+            moved = self._moved_stands(views)
+            found += [float(moved[k, motion]) for k, motion, _ in self._loose]
         for lens, view, prior in zip(self.lenses, views, self.priors, strict=True):
             change = view.camera.matrix - prior.camera.matrix
             bent = view.camera.distortion - prior.camera.distortion

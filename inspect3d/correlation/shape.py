@@ -13,7 +13,7 @@ from inspect3d.correlation.hidden import HiddenMotion
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.solver import State
-from inspect3d.correlation.uncertainty import Uncertainty
+from inspect3d.correlation.uncertainty import Systematic, Uncertainty
 from inspect3d.deviate.deviation import Deviation
 from inspect3d.nominal.nominal import InspectionMesh
 from inspect3d.register.gauge import Gauge, best_fit
@@ -34,6 +34,7 @@ class Shape:
     hidden : motions that the pictures do not show or show weakly
     facets : residuals and correlation of the scene's facets
     calibrated : the cameras as they were found on the nominal shape, before it moved; None where they were known
+    systematic : the shift of the pictures that is in the uncertainty
     """
 
     mesh: InspectionMesh
@@ -43,6 +44,7 @@ class Shape:
     hidden: tuple[HiddenMotion, ...]
     facets: Facets
     calibrated: tuple[View, ...] | None = None
+    systematic: Systematic | None = None
 
     @property
     def views(self) -> tuple[View, ...]:

@@ -172,7 +172,8 @@ class Solver:
 
 def held(freedom: Freedom, poses: bool = True) -> Freedom:
     """Return the freedom of cameras whose lenses may not change, nor their poses."""
-    return replace(freedom, poses="known" if poses else freedom.poses, lenses=tuple(Lens() for _ in freedom.lenses))
+    exact = tuple(Lens() for _ in freedom.lenses)
+    return replace(freedom, poses="known" if poses else freedom.poses, lenses=exact, stands=())
 
 
 def _step(

@@ -59,6 +59,7 @@ class Account:
     tiles, statistics, alignment, motions : labels and figures
     origin : about which the motions are meant
     free : motions the points leave free
+    hidden : motions that the pictures of a stereo method cannot tell
     """
 
     name: str
@@ -82,6 +83,7 @@ class Account:
     motions: Rows = field(default_factory=list)
     origin: str = ""
     free: tuple[str, ...] = ()
+    hidden: tuple[str, ...] = ()
     poses: tuple[PoseWords, ...] = ()
     labels: list[LabelWords] = field(default_factory=list)
     uncertainty: tuple[Contribution, ...] = ()
@@ -134,6 +136,7 @@ def account(record: Record, part: MeasuredPart, values: Mapping[str, Any], ancho
         motions=motions(first) if first else [],
         origin=", ".join(number(float(x), 2) for x in first.origin) if first else "",
         free=tuple(dict.fromkeys(free.words for each in part.alignments for free in each.free)),
+        hidden=part.hidden,
         labels=[_label(each) for each in readings(record.nominal.mesh, part, record.recipe.report.labels)],
         uncertainty=contributions(record, part),
     )

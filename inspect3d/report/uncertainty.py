@@ -59,7 +59,7 @@ def pose_sigma(mesh: InspectionMesh, alignment: Alignment) -> Floats:
 
 
 def _of_the_points(record: Record, part: MeasuredPart) -> list[Contribution]:
-    found = []
+    found = [Contribution(*each) for each in part.contributions]
     if part.noise is not None:
         words = "standard noise of one point; a node averages the points around it, by their scatter and number"
         found.append(Contribution("noise of the points", _micro(part.noise), words))
