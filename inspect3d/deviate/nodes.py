@@ -129,7 +129,7 @@ def _alignment(measured: NodalMeasurement, gauge: Gauge, motion: Floats, found: 
     before = measured.cad_from_measured
     moved = Pose.small(motion[:6], gauge.origin)
     shift = moved(((1 + growth) * (before.translation - gauge.origin) + gauge.origin)[None])[0]
-    free = named(gauge.free, gauge.origin, gauge.length)
+    free = named(gauge.free, gauge.origin, gauge.length) if refine else ()
     covariance = np.zeros((6, 6))
     if refine:
         covariance = gauge.covariance(found, gauge.length / BLOCKS)[:6, :6]
