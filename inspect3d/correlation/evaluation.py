@@ -81,7 +81,7 @@ def evaluation_points(nominal: Nominal, per_edge: Integers, lifted: bool = True)
 
 
 def interpolated(starts: Integers, shapes: Floats, triangles: Integers, values: Floats, unit: bool = False) -> Floats:
-    """Return nodal vectors (n, 3) at the points (p, 3) of facets (f, 3), see `EvaluationPoints`; `unit`: at length one."""
+    """Return nodal vectors (n, 3) at the points of facets (f, 3), see `EvaluationPoints`; `unit`: at length one."""
     from inspect3d.correlation.point_kernel import interpolate
 
     found = np.empty((len(shapes), 3))

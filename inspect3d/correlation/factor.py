@@ -98,6 +98,8 @@ class Factor:
         """Return A⁻¹ b for right-hand sides (n,) or (n, m)."""
         from inspect3d.correlation.sparse_kernel import solve
 
+        if not right.size:
+            return np.zeros(right.shape)
         x = np.ascontiguousarray(right[self.ordering.order].reshape(len(self.diagonal), -1))
         solve(*self.ordering.shape[:2], self.lower, self.diagonal, x)
         return x[self.ordering.place].reshape(right.shape)

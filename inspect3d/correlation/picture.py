@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -65,6 +66,11 @@ class Pictures:
             raise ValueError("a picture has grey levels that are not finite")
         if min(min(g.shape) for g in self.grey) < LEAST:
             raise ValueError(f"a picture has fewer than {LEAST} rows or columns")
+
+    @cached_property
+    def sharp(self) -> Stack:
+        """Return the pictures as they are, ready to be read."""
+        return self.blurred(0.0)
 
     def blurred(self, blur: float) -> Stack:
         """Return the pictures blurred by a Gaussian of standard deviation `blur` px, ready to be read.

@@ -18,6 +18,7 @@ from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
 
 FEWEST = 6
+SAMPLE = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +50,11 @@ class Scene:
         """Return the mean of the nodes, (3,) mm: small motions of the part are about it."""
         return self.nodes.mean(axis=0)
 
+    @property
+    def sample(self) -> Floats:
+        """Return some hundred of the nodes, all over the part, (k, 3) mm."""
+        return self.nodes[:: 1 + len(self.nodes) // SAMPLE]
+
     @cached_property
     def adjacency(self) -> sparse.csr_matrix:
         """Return a one for every pair of neighbours, (n, n)."""
@@ -74,10 +80,19 @@ class Scene:
 
     def position(self, rows: Integers, columns: Integers) -> Integers:
         """Return where entries stand in the pattern."""
+        return np.searchsorted(self._keys, rows * len(self.nodes) + columns)
+
+    @cached_property
+    def _keys(self) -> Integers:
+        """Number the entries of the pattern by row and column, ascending."""
         n = len(self.nodes)
-        starts, stored = self.ordering.starts, self.ordering.columns
-        keys = np.repeat(np.arange(n), np.diff(starts)) * n + stored
-        return np.searchsorted(keys, rows * n + columns)
+        return np.repeat(np.arange(n), np.diff(self.ordering.starts)) * n + self.ordering.columns
+
+    @cached_property
+    def diagonal(self) -> Integers:
+        """Return where the diagonal stands in the pattern, (n,)."""
+        every = np.arange(len(self.nodes))
+        return self.position(every, every)
 
     @cached_property
     def plate(self) -> Floats:

@@ -127,7 +127,7 @@ class Solver:
         stacks: dict[float, Stack] = {}
         for number, level in enumerate(self.levels):
             if level.blur not in stacks:
-                stacks = {level.blur: pictures.blurred(level.blur)}
+                stacks = {level.blur: pictures.blurred(level.blur) if level.blur > 0 else pictures.sharp}
             state = self._descended(scene, stacks[level.blur], state, freedom, number, told)
         return state
 
@@ -179,7 +179,7 @@ def _step(
     scene: Scene, found: Facets, noise: float, state: State, freedom: Freedom, level: Level
 ) -> tuple[Floats, Floats]:
     mixing, sigmas = freedom.spread(freedom.columns)
-    scale, slides = freedom.scale(state.views, scene.nodes), slides_of(scene, freedom, state.views)
+    scale, slides = freedom.scale(state.views, scene.sample), slides_of(scene, freedom, state.views)
     camera_right = mixing.T @ found.camera_right / noise - freedom.offset(state.views) / sigmas**2
     if level.moves in ON_NOMINAL:
         matrix = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)

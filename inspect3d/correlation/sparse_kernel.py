@@ -103,7 +103,7 @@ def panels_of(parents: Integers, begins: Integers) -> Integers:
 def factored(
     starts: Integers, columns: Integers, values: Floats, begins: Integers, rows: Integers, firsts: Integers
 ) -> tuple[Floats, Floats]:
-    """Return L's values, in the order of `rows`, and the diagonal D of A = L D L'; not positive where A is not definite.
+    """Return L's values, in the order of `rows`, and the diagonal D of A = L D L'; not positive if A is not definite.
 
     Notes
     -----
