@@ -104,6 +104,11 @@ class Scene:
         values[self.position(bending.row.astype(np.int64), bending.col.astype(np.int64))] = bending.data
         return values
 
+    def matrix(self, values: Floats) -> sparse.csr_matrix:
+        """Return a matrix (n, n) with these values in the pattern."""
+        n = len(self.nodes)
+        return sparse.csr_matrix((values, self.ordering.columns, self.ordering.starts), shape=(n, n))
+
     def assembled(self, blocks: Floats) -> Floats:
         """Return the values in the pattern of a sum of 3 x 3 blocks (f, 3, 3)."""
         size = len(self.ordering.columns)
@@ -164,7 +169,7 @@ class Scene:
         a, b, c = (self.nodes[self.triangles[:, k]] for k in range(3))
         area = weights * np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
         mass = self.assembled(area[:, None, None] / 12 * (np.ones((3, 3)) + np.eye(3)))
-        consistent = sparse.csr_matrix((mass, self.ordering.columns, self.ordering.starts), shape=(n, n))
+        consistent = self.matrix(mass)
         lumped = np.asarray(consistent.sum(axis=1)).ravel()
         inverse = np.divide(1.0, lumped, out=np.zeros(n), where=lumped > 0)
         smoother = 0.5 * (sparse.diags(inverse) @ consistent) + sparse.diags(np.where(lumped > 0, 0.5, 1.0))
