@@ -66,11 +66,12 @@ def project_with_slope(
     small shift of the camera frame is the same times R'; that by a small rotation follows by the cross product.
     """
     cx, cy, depth = in_camera(rotation, translation, px, py, pz)
-    x, y = cx / depth, cy / depth
+    over = 1.0 / depth
+    x, y = over * cx, over * cy
     u, v, u_x, u_y, v_y = distort(x, y, distortion)
-    x_u = (matrix[0, 0] * u_x + matrix[0, 1] * u_y) / depth
-    x_v = (matrix[0, 0] * u_y + matrix[0, 1] * v_y) / depth
-    y_u, y_v = matrix[1, 1] * u_y / depth, matrix[1, 1] * v_y / depth
+    x_u = over * (matrix[0, 0] * u_x + matrix[0, 1] * u_y)
+    x_v = over * (matrix[0, 0] * u_y + matrix[0, 1] * v_y)
+    y_u, y_v = over * matrix[1, 1] * u_y, over * matrix[1, 1] * v_y
     x_w, y_w = -(x_u * x + x_v * y), -(y_u * x + y_v * y)
     pixel = matrix[0, 0] * u + matrix[0, 1] * v + matrix[0, 2], matrix[1, 1] * v + matrix[1, 2], depth
     slope = (

@@ -14,11 +14,11 @@ from inspect3d.correlation.disagreement import disagreement
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.hidden import hidden_motions
 from inspect3d.correlation.normal import Facets, facets
-from inspect3d.correlation.picture import Interpolation, Pictures, Stack
+from inspect3d.correlation.picture import Interpolation, Pictures
 from inspect3d.correlation.scene import Scene, scene
 from inspect3d.correlation.shape import Shape
 from inspect3d.correlation.solver import COARSE, ON_NOMINAL, Level, Solver, State, Step, held
-from inspect3d.correlation.uncertainty import Systematic, uncertainty
+from inspect3d.correlation.uncertainty import Systematic, needed_columns, uncertainty
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
 
@@ -106,21 +106,20 @@ class Correlate:
             seen = self._scene(nominal, state.views, masks)
             state = Solver(levels[-1:])(seen, pictures, state.views, freedom, deviation[seen.node], told)
         last = freedom if levels[-1].moves == "both" else held(freedom)
-        stack = pictures.blurred(0.0)
+        found = self._found(seen, pictures, state, last)
         for _ in range(ROUNDS):
-            found = _found(seen, stack, state, last)
             good = self._good(found) & (seen.tilt(state.deviation) <= STEEPEST_TILT)
             if good.all():
                 break
             _require_some(good, found)
             seen, node = seen.restricted(good)
             state = Solver(levels[-1:])(seen, pictures, state.views, freedom, state.deviation[node], told)
-        found = _found(seen, stack, state, last)
+            found = self._found(seen, pictures, state, last)
         systematic = self.systematic
         if systematic is not None:
-            floor = disagreement(seen, stack, state.views, state.deviation)
+            floor = disagreement(seen, pictures.sharp, state.views, state.deviation)
             systematic = replace(systematic, size=max(systematic.size, floor))
-        sure = uncertainty(seen, stack, state.views, state.deviation, state.weights, last, systematic)
+        sure = uncertainty(seen, found, state.views, state.weights, last, systematic)
         local = float(np.sqrt(np.median(sure.system.nodal.inverse_diagonal)))
         motions = hidden_motions(seen, sure.system, last, local)
         return Shape(nominal.mesh, seen, state, sure, motions, found, calibrated, systematic)
@@ -129,14 +128,15 @@ class Correlate:
         masks = masks or [None] * len(views)
         return scene(nominal, views, self.pixels, np.radians(self.steepest), masks, self.per_edge, self.lifted)
 
+    def _found(self, seen: Scene, pictures: Pictures, state: State, freedom: Freedom) -> Facets:
+        """Return what the pictures say about the facets in the end, as `uncertainty` needs it."""
+        columns, whole = needed_columns(freedom, self.systematic), self.systematic is not None
+        return facets(seen, pictures.sharp, state.views, state.deviation, state.weights, columns, power=2, whole=whole)
+
     def _good(self, found: Facets) -> Booleans:
         """Tell which facets agree between the pictures, (f,)."""
         median = np.median(found.noise)
         return (found.correlation >= self.poorest) & (found.noise <= NOISY * median)
-
-
-def _found(seen: Scene, stack: Stack, state: State, freedom: Freedom) -> Facets:
-    return facets(seen, stack, state.views, state.deviation, state.weights, freedom.columns)
 
 
 def _require_sizes(pictures: Pictures, views: Sequence[View]) -> None:

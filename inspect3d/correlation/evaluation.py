@@ -73,12 +73,20 @@ def evaluation_points(nominal: Nominal, per_edge: Integers, lifted: bool = True)
     for n in np.unique(per_edge):
         chosen = np.flatnonzero(per_edge == n)
         shapes[starts[chosen][:, None] + np.arange(n * n)] = centres(int(n))
-    facet = np.repeat(np.arange(len(mesh.triangles)), np.diff(starts))
-    places = np.einsum("pi,pij->pj", shapes, mesh.nodes[mesh.triangles[facet]])
+    places = interpolated(starts, shapes, mesh.triangles, mesh.nodes)
     feet = nominal.surface.closest(places)
     if lifted:
         return EvaluationPoints(feet.points, shapes, starts)
     return EvaluationPoints(places, shapes, starts, chord=float(np.abs(feet.distance).max()))
+
+
+def interpolated(starts: Integers, shapes: Floats, triangles: Integers, values: Floats, unit: bool = False) -> Floats:
+    """Return nodal vectors (n, 3) at the points of facets (f, 3), see `EvaluationPoints`; `unit`: at length one."""
+    from inspect3d.correlation.point_kernel import interpolate
+
+    found = np.empty((len(shapes), 3))
+    interpolate(starts, shapes, triangles, values, unit, found)
+    return found
 
 
 def centres(n: int) -> Floats:

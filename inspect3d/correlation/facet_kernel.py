@@ -9,6 +9,10 @@ With tangents T (3, 2) of the surface and P_k = dx_k/dX (2, 3), one gradient G =
 in the coordinates of the material serves all views, so that dz_k/dp = G . (P_k T)⁻¹ dx_k/dp. A motion that slides all
 pictures together over the surface then has the derivative zero, as it must; each picture's own, noisy gradient would
 give it a stiffness it has not.
+
+With b_k the derivatives of z_k by the parameters, and zero by those of other views, the residual z_k - z has the
+derivatives b_k - sum_o w_o b_o / w, w = sum w, so that the normal matrix is that of all products b_k b_o', each taken
+w_k (k = o) - w_k w_o / w times.
 """
 
 from __future__ import annotations
@@ -17,13 +21,30 @@ import numpy as np
 from numba import njit, prange
 
 from inspect3d.arrays import Booleans, Floats, Integers
-from inspect3d.correlation.reading_kernel import Points, Rig, Stack, normalise, read_facet, share
+from inspect3d.correlation.reading_kernel import (
+    GREY,
+    PLACED,
+    READING,
+    SHAPE,
+    SLIDE,
+    SLOPE,
+    Points,
+    Rig,
+    Stack,
+    place_facet,
+    sample_facet,
+    see_facet,
+    write_columns,
+)
+from inspect3d.correlation.row_kernel import normalised, product, total
 
 Out = tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats]
 
 CHUNKS = 64
 FEWEST = 6
 NOISIEST = 0.25
+GX, GY, MEAN, MEAN_X, MEAN_Y, NODES, WORK = 0, 1, 2, 3, 4, 5, 6
+"""Rows of a facet's work: G (2 rows), the mean grey level z, the mean slide over the views (2), |N|²."""
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
@@ -42,7 +63,7 @@ def accumulate(
 
     Parameters
     ----------
-    stack : levels (v, rows, columns), sizes (v, 2), cubic
+    stack : levels (v, rows, columns), sizes (v, 2), cubic, step
     rig : matrices (v, 3, 3), distortions (v, 5), rotations (v, 3, 3), translations (v, 3), origin (3,)
     points : places (p, 3) mm, shapes (p, 3), starts (f + 1,), corners (f, 3), normals (n, 3)
     taking : (f, v), the views that see the facet
@@ -60,12 +81,9 @@ def accumulate(
     for f in range(facets):
         most = max(most, points[2][f + 1] - points[2][f])
     for chunk in prange(CHUNKS):
-        grey = np.empty((views, most))
-        slopes, normal_slides = np.empty((views, most, 2)), np.empty((views, most, 2))
-        slides = np.empty((views, most, c, 2))
-        shape = np.empty((most, 3))
-        spread, sums = np.empty(views), np.empty((3, views, 3 + c))
-        column, seen = np.empty((views, 3 + views * c)), np.empty(views, np.int64)
+        placed, reading, work = np.empty((PLACED, most)), np.empty((views, READING, most)), np.empty((WORK, most))
+        rows, sums = np.empty((views * (3 + c), most)), np.empty((2, views, 3 + c))
+        spread, seen = np.empty(views), np.empty(views, np.int64)
         block, right = np.empty((3 + views * c, 3 + views * c)), np.empty(3 + views * c)
         for f in range(chunk * facets // CHUNKS, (chunk + 1) * facets // CHUNKS):
             k_seen = 0
@@ -76,170 +94,144 @@ def accumulate(
             out[6][f] = 0.0
             n = 0
             if k_seen >= 2:
-                n = read_facet(
-                    stack, rig, points, f, seen[:k_seen], deviation, columns, grey, slopes, normal_slides, slides, shape
-                )
-            if n < FEWEST or not normalise(grey, k_seen, n, spread):
+                n = place_facet(points, f, deviation, placed)
+                for m in range(k_seen):
+                    see_facet(rig, seen[m], placed, n, reading[m])
+                    sample_facet(stack, seen[m], n, reading[m])
+            if n < FEWEST or not _normalise(reading, k_seen, n, spread):
                 out[0][f], out[1][f], out[2][f] = 0.0, 0.0, 0.0
                 continue
-            share(slopes, k_seen, n, spread)
-            _sum(
-                grey, slopes, normal_slides, slides, shape, k_seen, n, c, spread, sums, column, block, right, out[6][f]
-            )
+            _share(placed, reading, k_seen, n, spread, work)
+            _judge(reading, k_seen, n, spread, work, out[6][f])
+            for m in range(k_seen):
+                at = m * (3 + c)
+                _write_nodes(placed, reading[m], n, work, rows[at : at + 3])
+                if c:
+                    write_columns(columns, seen[m], rig, placed, reading[m], work, n, rows[at + 3 : at + 3 + c])
+            _sum(rows, reading, k_seen, n, c, spread, work, sums, block, right)
             _deal(f, chunk, seen, k_seen, c, weights[f], power, block, right, out)
 
 
 @njit(cache=True, error_model="numpy")
-def _sum(
-    grey: Floats,
-    slopes: Floats,
-    normal_slides: Floats,
-    slides: Floats,
-    shape: Floats,
-    views: int,
-    n: int,
-    c: int,
-    spread: Floats,
-    sums: Floats,
-    column: Floats,
-    block: Floats,
-    right: Floats,
-    statistics: Floats,
-) -> None:
-    """Accumulate a facet's block of the normal matrix, its right-hand side and its statistics.
+def _normalise(reading: Floats, views: int, n: int, spread: Floats) -> bool:
+    """Bring each view's grey levels to mean 0 and variance 1; return False where one has no contrast at all."""
+    for m in range(views):
+        mean, spread[m] = normalised(reading[m, GREY], n)
+        if not spread[m] > 1e-9 * (1.0 + abs(mean)):
+            return False
+    return True
 
-    Local unknowns: three nodes, then c parameters of each view. `sums` holds, for each view, the sums over the points
-    of its rows by 1 (0) and by the mean profile z (1), which normalising takes out, and by the residual (2).
-    """
-    size = 3 + views * c
-    total, squares = 0.0, 0.0
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _share(placed: Floats, reading: Floats, views: int, n: int, spread: Floats, work: Floats) -> None:
+    """Write G, z and the mean slide; turn each view's slopes into its part of G, w_k (P_k T)' g_k / s_k / sum w."""
+    whole = 0.0
     for m in range(views):
-        total += spread[m] ** 2
+        whole += spread[m] ** 2
+    work[: NODES + 1, :n] = 0.0
     for m in range(views):
-        squares += spread[m] ** 4 / total**2
-    block[:size, :size] = 0.0
-    sums[:, :views] = 0.0
-    energy, profile, agreement, noisy, clean = 0.0, 0.0, 0.0, 0.0, 0.0
+        part, weight = spread[m] / whole, spread[m] ** 2 / whole
+        row = reading[m]
+        for q in range(n):
+            row[SLOPE, q] *= part
+            row[SLOPE + 1, q] *= part
+            work[GX, q] += row[SLOPE, q]
+            work[GY, q] += row[SLOPE + 1, q]
+            work[MEAN, q] += weight * row[GREY, q]
+            work[MEAN_X, q] += weight * row[SLIDE, q]
+            work[MEAN_Y, q] += weight * row[SLIDE + 1, q]
+    for i in range(3):
+        for q in range(n):
+            work[NODES, q] += placed[SHAPE + i, q] ** 2
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def _judge(reading: Floats, views: int, n: int, spread: Floats, work: Floats, statistics: Floats) -> None:
+    """Write a facet's statistics; see `accumulate`."""
+    whole, squares, agreement, energy, noisy, clean = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for m in range(views):
+        whole += spread[m] ** 2
+    for m in range(views):
+        squares += spread[m] ** 4 / whole**2
     for q in range(n):
-        gx, gy, mean, plain = 0.0, 0.0, 0.0, 0.0
-        slide_x, slide_y = 0.0, 0.0
+        plain = 0.0
         for m in range(views):
-            part = spread[m] ** 2 / total
-            gx, gy = gx + slopes[m, q, 0], gy + slopes[m, q, 1]
-            mean += part * grey[m, q]
-            plain += grey[m, q]
-            slide_x, slide_y = slide_x + part * normal_slides[m, q, 0], slide_y + part * normal_slides[m, q, 1]
-        profile += mean * mean
+            plain += reading[m, GREY, q]
         agreement += plain * plain
-        nodes = shape[q, 0] ** 2 + shape[q, 1] ** 2 + shape[q, 2] ** 2
-        for m in range(views):
-            weight = spread[m] ** 2
-            residual = grey[m, q] - mean
-            energy += weight * residual * residual
-            ax, ay = normal_slides[m, q, 0] - slide_x, normal_slides[m, q, 1] - slide_y
+    for m in range(views):
+        weight, row = spread[m] ** 2, reading[m]
+        for q in range(n):
+            ax, ay = row[SLIDE, q] - work[MEAN_X, q], row[SLIDE + 1, q] - work[MEAN_Y, q]
+            both = work[GX, q] * ax + work[GY, q] * ay
             own = 0.0
             for other in range(views):
-                own += (slopes[other, q, 0] * ax + slopes[other, q, 1] * ay) ** 2
-            both = (gx * ax + gy * ay) ** 2
-            noisy += weight * nodes * both
-            clean += weight * nodes * (both - own) / (1.0 - squares)
-            along = gx * normal_slides[m, q, 0] + gy * normal_slides[m, q, 1]
-            for i in range(3):
-                row = along * shape[q, i]
-                sums[0, m, i] += row
-                sums[1, m, i] += row * mean
-                sums[2, m, i] += row * residual
-            for j in range(c):
-                row = gx * slides[m, q, j, 0] + gy * slides[m, q, j, 1]
-                sums[0, m, 3 + j] += row
-                sums[1, m, 3 + j] += row * mean
-                sums[2, m, 3 + j] += row * residual
-            _column(m, q, gx, gy, ax, ay, slides, shape, views, c, spread, total, column)
-            if views > 2:
-                _add(block, column[m], weight, size)
-        if views == 2:  # the rows of the two views are opposite: w_1 c_1 = -w_2 c_2
-            _add(block, column[0], spread[0] ** 2 * total / spread[1] ** 2, size)
-    _project(block, right, sums, views, n, c, spread, total, profile, column)
+                own += (reading[other, SLOPE, q] * ax + reading[other, SLOPE + 1, q] * ay) ** 2
+            energy += weight * (row[GREY, q] - work[MEAN, q]) ** 2
+            noisy += weight * work[NODES, q] * both**2
+            clean += weight * work[NODES, q] * (both**2 - own)
     statistics[0], statistics[1] = energy, n
     statistics[2] = (agreement / n - views) / (views * (views - 1))
-    statistics[3] = min(max(clean / noisy, NOISIEST), 1.0) if noisy > 0 else NOISIEST
+    statistics[3] = min(max(clean / (1.0 - squares) / noisy, NOISIEST), 1.0) if noisy > 0 else NOISIEST
 
 
-@njit(cache=True, error_model="numpy")
-def _add(block: Floats, row: Floats, weight: float, size: int) -> None:
-    """Add weight times row' row to the upper triangle of a block."""
-    for i in range(size):
-        first = weight * row[i]
-        for j in range(i, size):
-            block[i, j] += first * row[j]
-
-
-@njit(cache=True, error_model="numpy")
-def _column(
-    m: int,
-    q: int,
-    gx: float,
-    gy: float,
-    ax: float,
-    ay: float,
-    slides: Floats,
-    shape: Floats,
-    views: int,
-    c: int,
-    spread: Floats,
-    total: float,
-    column: Floats,
-) -> None:
-    """Write the derivative of view m's residual z_m - z at point q by the local unknowns."""
-    across = gx * ax + gy * ay
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _write_nodes(placed: Floats, reading: Floats, n: int, work: Floats, rows: Floats) -> None:
+    """Write a view's derivatives by the three nodes, less their mean over the views, which falls out (3, most)."""
     for i in range(3):
-        column[m, i] = across * shape[q, i]
-    for other in range(views):
-        factor = (1.0 if other == m else 0.0) - spread[other] ** 2 / total
-        for j in range(c):
-            column[m, 3 + other * c + j] = factor * (gx * slides[other, q, j, 0] + gy * slides[other, q, j, 1])
+        for q in range(n):
+            x, y = reading[SLIDE, q] - work[MEAN_X, q], reading[SLIDE + 1, q] - work[MEAN_Y, q]
+            rows[i, q] = (work[GX, q] * x + work[GY, q] * y) * placed[SHAPE + i, q]
 
 
 @njit(cache=True, error_model="numpy")
-def _project(
-    block: Floats,
-    right: Floats,
-    sums: Floats,
+def _sum(
+    rows: Floats,
+    reading: Floats,
     views: int,
     n: int,
     c: int,
     spread: Floats,
-    total: float,
-    profile: float,
-    column: Floats,
+    work: Floats,
+    sums: Floats,
+    block: Floats,
+    right: Floats,
 ) -> None:
-    """Take the mean and the mean profile, which normalising removes, out of the block; write the right-hand side."""
-    size = 3 + views * c
+    """Accumulate a facet's block of the normal matrix and its right-hand side.
+
+    Local unknowns: three nodes, then c parameters of each view. `sums` holds, for each view, the sums over the points
+    of its derivatives by 1 (0) and by the mean profile z (1), which normalising takes out.
+    """
+    size, width, whole = 3 + views * c, 3 + c, 0.0
+    profile = product(work[MEAN], work[MEAN], n)
+    block[:size, :size] = 0.0
     right[:size] = 0.0
     for m in range(views):
-        weight = spread[m] ** 2
-        for i in range(3):
-            right[i] -= weight * sums[2, m, i]
-        for j in range(c):
-            right[3 + m * c + j] -= weight * sums[2, m, 3 + j]
-    for kind in range(2):
-        norm = 1.0 / n if kind == 0 else 1.0 / profile
-        for m in range(views):
-            for i in range(3):
-                column[m, i] = sums[kind, m, i]
-                for other in range(views):
-                    column[m, i] -= spread[other] ** 2 / total * sums[kind, other, i]
-            for other in range(views):
-                factor = (1.0 if other == m else 0.0) - spread[other] ** 2 / total
-                for j in range(c):
-                    column[m, 3 + other * c + j] = factor * sums[kind, other, 3 + j]
-            for i in range(size):
-                first = spread[m] ** 2 * norm * column[m, i]
-                for j in range(i, size):
-                    block[i, j] -= first * column[m, j]
+        whole += spread[m] ** 2
+        for a in range(width):
+            row = rows[m * width + a]
+            sums[0, m, a] = total(row, n)
+            sums[1, m, a] = product(row, work[MEAN], n)
+            right[_place(m, a, c)] -= spread[m] ** 2 * (product(row, reading[m, GREY], n) - sums[1, m, a])
+    for m in range(views):
+        for a in range(width):
+            i = _place(m, a, c)
+            for other in range(m + 1):
+                times = spread[m] ** 2 * (1.0 * (m == other) - spread[other] ** 2 / whole)
+                for b in range(a + 1 if m == other else width):
+                    j = _place(other, b, c)
+                    entry = product(rows[m * width + a], rows[other * width + b], n)
+                    entry -= sums[0, m, a] * sums[0, other, b] / n + sums[1, m, a] * sums[1, other, b] / profile
+                    twice = i == j and m != other
+                    block[max(i, j), min(i, j)] += (2.0 if twice else 1.0) * times * entry
     for i in range(size):
         for j in range(i):
-            block[i, j] = block[j, i]
+            block[j, i] = block[i, j]
+
+
+@njit(cache=True)
+def _place(m: int, a: int, c: int) -> int:
+    """Return which local unknown the derivative a of view m is by."""
+    return a if a < 3 else a + m * c
 
 
 @njit(cache=True, error_model="numpy")

@@ -25,14 +25,21 @@ class Ordering:
 
     @cached_property
     def order(self) -> Integers:
-        """Return the unknowns in the order of elimination (n,): minimum degree, by SuperLU."""
+        """Return the unknowns in the order of elimination (n,): minimum degree, by SuperLU.
+
+        Each follows right upon those on whose elimination its own depends.
+        """
         from scipy.sparse.linalg import splu
+
+        from inspect3d.correlation.sparse_kernel import children_first, elimination_tree
 
         n = len(self.starts) - 1
         pattern = sparse.csc_matrix((-np.ones(len(self.columns)), self.columns, self.starts), shape=(n, n))
         pattern.setdiag(np.diff(self.starts) + 1.0)
         options = {"SymmetricMode": True}
-        return np.argsort(splu(pattern, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).perm_c)
+        order = np.argsort(splu(pattern, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).perm_c)
+        starts, columns, _ = self._in_order(order)
+        return order[children_first(elimination_tree(starts, columns))]
 
     @cached_property
     def place(self) -> Integers:
@@ -41,20 +48,26 @@ class Ordering:
         place[self.order] = np.arange(len(place))
         return place
 
-    @cached_property
-    def _reordered(self) -> tuple[Integers, Integers, Integers]:
-        """Rows of the pattern in the new order: starts, columns, and where each value stood."""
+    def _in_order(self, order: Integers) -> tuple[Integers, Integers, Integers]:
+        """Rows of the pattern in an order: starts, columns, and where each value stood."""
         n = len(self.starts) - 1
         stood = sparse.csr_matrix((np.arange(len(self.columns)), self.columns, self.starts), shape=(n, n))
-        moved = stood[self.order][:, self.order].tocsr()
+        moved = stood[order][:, order].tocsr()
         return moved.indptr.astype(np.int64), moved.indices.astype(np.int64), moved.data
 
     @cached_property
-    def _shape(self) -> tuple[Integers, Integers]:
-        from inspect3d.correlation.sparse_kernel import symbolic
+    def _reordered(self) -> tuple[Integers, Integers, Integers]:
+        return self._in_order(self.order)
+
+    @cached_property
+    def shape(self) -> tuple[Integers, Integers, Integers]:
+        """Return the pattern of L by columns, starts (n + 1,) and rows, and where its panels start, (s + 1,)."""
+        from inspect3d.correlation.sparse_kernel import elimination_tree, panels_of, symbolic
 
         starts, columns, _ = self._reordered
-        return symbolic(starts, columns)
+        parents = elimination_tree(starts, columns)
+        begins, rows = symbolic(starts, columns, parents)
+        return begins, rows, panels_of(parents, begins)
 
     def factor(self, values: Floats) -> Factor:
         """Return the factor of the matrix with these values, in the order of `columns`.
@@ -67,10 +80,10 @@ class Ordering:
         from inspect3d.correlation.sparse_kernel import factored
 
         starts, columns, stood = self._reordered
-        parts = factored(starts, columns, values[stood], *self._shape)
-        if not (parts[3] > 0).all():
+        lower, diagonal = factored(starts, columns, values[stood], *self.shape)
+        if not (diagonal > 0).all():
             raise ValueError("the matrix is not positive definite")
-        return Factor(self, *parts)
+        return Factor(self, lower, diagonal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +91,6 @@ class Factor:
     """A = L D L', rows and columns in the order of elimination."""
 
     ordering: Ordering
-    begins: Integers
-    rows: Integers
     lower: Floats
     diagonal: Floats
 
@@ -87,15 +98,18 @@ class Factor:
         """Return A⁻¹ b for right-hand sides (n,) or (n, m)."""
         from inspect3d.correlation.sparse_kernel import solve
 
+        if not right.size:
+            return np.zeros(right.shape)
         x = np.ascontiguousarray(right[self.ordering.order].reshape(len(self.diagonal), -1))
-        solve(self.begins, self.rows, self.lower, self.diagonal, x)
+        solve(*self.ordering.shape[:2], self.lower, self.diagonal, x)
         return x[self.ordering.place].reshape(right.shape)
 
     @cached_property
     def _inverse(self) -> tuple[Floats, Floats]:
         from inspect3d.correlation.sparse_kernel import inverted
 
-        return inverted(self.begins, self.rows, self.lower, self.diagonal)
+        begins, rows, panels = self.ordering.shape
+        return inverted(begins, rows, self.lower, self.diagonal, panels)
 
     @property
     def inverse_diagonal(self) -> Floats:
@@ -107,10 +121,10 @@ class Factor:
         from inspect3d.correlation.sparse_kernel import quadratic
 
         columns = self.ordering.place[rows.indices]
-        return quadratic(self.begins, self.rows, *self._inverse, rows.indptr.astype(np.int64), columns, rows.data)
+        return quadratic(*self.ordering.shape[:2], *self._inverse, rows.indptr.astype(np.int64), columns, rows.data)
 
     def blocks(self, triangles: Integers) -> Floats:
         """Return the entries of A⁻¹ between the corners of triangles (f, 3), (f, 3, 3)."""
         from inspect3d.correlation.sparse_kernel import blocks
 
-        return blocks(self.begins, self.rows, *self._inverse, self.ordering.place[triangles])
+        return blocks(*self.ordering.shape[:2], *self._inverse, self.ordering.place[triangles])

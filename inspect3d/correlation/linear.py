@@ -82,13 +82,11 @@ def stiffened(scene: Scene, values: Floats, stiffness: float) -> tuple[Floats, F
     stiffness : of the plate, in medians of the diagonal. A millionth of that stays always, to carry nodes that show no
         texture, and a billionth of a ridge
     """
-    every = np.arange(len(scene.nodes))
-    diagonal = scene.position(every, every)
-    stiff_ones = values[diagonal][values[diagonal] > 0]
+    stiff_ones = values[scene.diagonal][values[scene.diagonal] > 0]
     median = float(np.median(stiff_ones)) if len(stiff_ones) else 1.0
     plate = stiffness * median * scene.plate
     stiff = values + plate + SUPPORT * median * scene.plate
-    stiff[diagonal] += RIDGE * median
+    stiff[scene.diagonal] += RIDGE * median
     return stiff, plate
 
 

@@ -104,7 +104,7 @@ def facets(
         np.empty((f, 4)),
     )
     accumulate(
-        (stack.levels, stack.sizes, stack.cubic),
+        (stack.levels, stack.sizes, stack.cubic, stack.step),
         rig,
         (points.places, points.shapes, points.starts, scene.triangles, scene.normals),
         scene.taking,

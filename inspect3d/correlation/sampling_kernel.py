@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from numba import njit
 
-from inspect3d.arrays import Floats
+from inspect3d.arrays import Floats, Singles
 
 Sample = tuple[float, float, float]
 
 
-@njit(cache=True, error_model="numpy")
-def sample_cubic(coefficients: Floats, width: int, height: int, x: float, y: float) -> Sample:
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def sample_cubic(coefficients: Singles, width: int, height: int, x: float, y: float) -> Sample:
     """Return value, d/dx and d/dy of the cubic B-spline with these coefficients at the pixel (x, y).
 
     Beyond the last but one pixel the outermost whole patch goes on.
@@ -46,7 +46,7 @@ def sample_cubic(coefficients: Floats, width: int, height: int, x: float, y: flo
 
 
 @njit(cache=True, error_model="numpy")
-def sample_linear(picture: Floats, width: int, height: int, x: float, y: float) -> Sample:
+def sample_linear(picture: Singles, width: int, height: int, x: float, y: float) -> Sample:
     """Return value, d/dx and d/dy of the bilinear interpolation at the pixel (x, y), as in the paper."""
     i = min(max(int(x), 0), width - 2)
     j = min(max(int(y), 0), height - 2)
@@ -57,7 +57,7 @@ def sample_linear(picture: Floats, width: int, height: int, x: float, y: float) 
 
 
 @njit(cache=True)
-def sample_all(picture: Floats, cubic: bool, places: Floats, found: Floats) -> None:
+def sample_all(picture: Singles, cubic: bool, places: Floats, found: Floats) -> None:
     """Write value and gradient (n, 3) of a picture at places (n, 2) px; `cubic`: it holds B-spline coefficients."""
     height, width = picture.shape
     for n in range(len(places)):

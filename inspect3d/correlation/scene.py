@@ -18,6 +18,7 @@ from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
 
 FEWEST = 6
+SAMPLE = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +50,11 @@ class Scene:
         """Return the mean of the nodes, (3,) mm: small motions of the part are about it."""
         return self.nodes.mean(axis=0)
 
+    @property
+    def sample(self) -> Floats:
+        """Return some hundred of the nodes, all over the part, (k, 3) mm."""
+        return self.nodes[:: 1 + len(self.nodes) // SAMPLE]
+
     @cached_property
     def adjacency(self) -> sparse.csr_matrix:
         """Return a one for every pair of neighbours, (n, n)."""
@@ -74,10 +80,19 @@ class Scene:
 
     def position(self, rows: Integers, columns: Integers) -> Integers:
         """Return where entries stand in the pattern."""
+        return np.searchsorted(self._keys, rows * len(self.nodes) + columns)
+
+    @cached_property
+    def _keys(self) -> Integers:
+        """Number the entries of the pattern by row and column, ascending."""
         n = len(self.nodes)
-        starts, stored = self.ordering.starts, self.ordering.columns
-        keys = np.repeat(np.arange(n), np.diff(starts)) * n + stored
-        return np.searchsorted(keys, rows * n + columns)
+        return np.repeat(np.arange(n), np.diff(self.ordering.starts)) * n + self.ordering.columns
+
+    @cached_property
+    def diagonal(self) -> Integers:
+        """Return where the diagonal stands in the pattern, (n,)."""
+        every = np.arange(len(self.nodes))
+        return self.position(every, every)
 
     @cached_property
     def plate(self) -> Floats:
@@ -88,6 +103,11 @@ class Scene:
         values = np.zeros(len(self.ordering.columns))
         values[self.position(bending.row.astype(np.int64), bending.col.astype(np.int64))] = bending.data
         return values
+
+    def matrix(self, values: Floats) -> sparse.csr_matrix:
+        """Return a matrix (n, n) with these values in the pattern."""
+        n = len(self.nodes)
+        return sparse.csr_matrix((values, self.ordering.columns, self.ordering.starts), shape=(n, n))
 
     def assembled(self, blocks: Floats) -> Floats:
         """Return the values in the pattern of a sum of 3 x 3 blocks (f, 3, 3)."""
@@ -149,7 +169,7 @@ class Scene:
         a, b, c = (self.nodes[self.triangles[:, k]] for k in range(3))
         area = weights * np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
         mass = self.assembled(area[:, None, None] / 12 * (np.ones((3, 3)) + np.eye(3)))
-        consistent = sparse.csr_matrix((mass, self.ordering.columns, self.ordering.starts), shape=(n, n))
+        consistent = self.matrix(mass)
         lumped = np.asarray(consistent.sum(axis=1)).ravel()
         inverse = np.divide(1.0, lumped, out=np.zeros(n), where=lumped > 0)
         smoother = 0.5 * (sparse.diags(inverse) @ consistent) + sparse.diags(np.where(lumped > 0, 0.5, 1.0))

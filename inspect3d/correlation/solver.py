@@ -11,6 +11,8 @@ from scipy import sparse
 
 from inspect3d.arrays import Floats
 from inspect3d.camera import View
+from inspect3d.correlation.conjugate import conjugate
+from inspect3d.correlation.factor import Factor
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.linear import noise_of, robust, slides_of, stiffened, system_of
 from inspect3d.correlation.normal import Facets, facets
@@ -88,12 +90,13 @@ class Solver:
     Parameters
     ----------
     levels : in their order
-    tolerance : mm; the last level ends when no node moves farther in a step, the others at half a micrometre
+    tolerance : mm; the last level ends when no node moves farther in a step, the others at half a micrometre,
+        times the pixels of the blur
 
     After four steps of a level, one that turns back is halved, and so are the next until they go on: where the
     pictures show a motion weakly, a full step goes too far and the next comes back. The robust weights of the facets
     settle in the first steps of a level and are then kept, lest they take turns. Blurred pictures show less, and are
-    compared at fewer points: one of 1 + blur².
+    compared at fewer points: one of 1 + 1.5 blur².
     """
 
     levels: tuple[Level, ...]
@@ -127,7 +130,7 @@ class Solver:
         stacks: dict[float, Stack] = {}
         for number, level in enumerate(self.levels):
             if level.blur not in stacks:
-                stacks = {level.blur: pictures.blurred(level.blur)}
+                stacks = {level.blur: pictures.blurred(level.blur) if level.blur > 0 else pictures.sharp}
             state = self._descended(scene, stacks[level.blur], state, freedom, number, told)
         return state
 
@@ -137,10 +140,11 @@ class Solver:
         level = self.levels[number]
         if level.moves in ("shape", "poses"):
             freedom = held(freedom, poses=level.moves == "shape")
-        points = scene.points.thinned(1 + int(level.blur) ** 2) if level.blur >= 1 else scene.points
+        points = scene.points.thinned(1 + int(1.5 * level.blur**2)) if level.blur >= 1 else scene.points
         final = number == len(self.levels) - 1
-        tolerance = self.tolerance if final else max(self.tolerance, COARSE)
+        tolerance = self.tolerance if final else max(self.tolerance, COARSE * max(1.0, level.blur))
         last, factor = np.zeros(len(scene.nodes)), 1.0
+        nodal: Factor | None = None
         for count in range(level.steps):
             found = facets(scene, stack, state.views, state.deviation, state.weights, freedom.columns, points=points)
             if not np.isfinite(found.noise).any():
@@ -149,7 +153,11 @@ class Solver:
                     "part, exposed right, and that the cameras stand where they are said to."
                 )
             noise = noise_of(found, state.weights, len(scene.nodes))
-            shape, cameras = _step(scene, found, noise, state, freedom, level)
+            if freedom.unknowns or level.moves in ON_NOMINAL:
+                shape, cameras = _step(scene, found, noise, state, freedom, level)
+            else:
+                cameras = np.zeros(0)
+                shape, nodal = _step_of_shape(scene, found, noise, state, level, nodal)
             change = max(
                 float(np.abs(shape).max()), _reach(scene, cameras, freedom) if level.moves in ON_NOMINAL else 0
             )
@@ -180,7 +188,7 @@ def _step(
     scene: Scene, found: Facets, noise: float, state: State, freedom: Freedom, level: Level
 ) -> tuple[Floats, Floats]:
     mixing, sigmas = freedom.spread(freedom.columns)
-    scale, slides = freedom.scale(state.views, scene.nodes), slides_of(scene, freedom, state.views)
+    scale, slides = freedom.scale(state.views, scene.sample), slides_of(scene, freedom, state.views)
     camera_right = mixing.T @ found.camera_right / noise - freedom.offset(state.views) / sigmas**2
     if level.moves in ON_NOMINAL:
         matrix = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)
@@ -189,12 +197,31 @@ def _step(
         return np.zeros(len(scene.nodes)), inverse @ camera_right
     factors = state.weights * found.clean
     system = system_of(scene, found, factors, noise, freedom, freedom.columns, scale, slides, level.stiffness)
+    return system.solve(_nodal_equations(scene, found, noise, state, level)[1], camera_right)
+
+
+def _step_of_shape(
+    scene: Scene, found: Facets, noise: float, state: State, level: Level, nodal: Factor | None
+) -> tuple[Floats, Factor]:
+    """Return the step with the cameras held, and a factor that may serve the next step as one of before may this."""
+    matrix, right = _nodal_equations(scene, found, noise, state, level)
+    shape = None if nodal is None else conjugate(matrix, right, nodal)
+    if nodal is None or shape is None:
+        nodal = scene.ordering.factor(matrix.data)
+        shape = nodal.solve(right)
+    return shape, nodal
+
+
+def _nodal_equations(
+    scene: Scene, found: Facets, noise: float, state: State, level: Level
+) -> tuple[sparse.csr_matrix, Floats]:
+    """Return matrix and right-hand side (n,) of the nodes, with the plate of the level."""
+    factors = state.weights * found.clean / noise
+    values, plate = stiffened(scene, scene.assembled(found.node * factors[:, None, None]), level.stiffness)
     right = scene.gathered(found.right * (state.weights / noise)[:, None])
     if level.stiffness > 0:
-        _, plate = stiffened(scene, scene.assembled(found.node * (factors / noise)[:, None, None]), level.stiffness)
-        n, ordering = len(scene.nodes), scene.ordering
-        right -= sparse.csr_matrix((plate, ordering.columns, ordering.starts), shape=(n, n)) @ state.deviation
-    return system.solve(right, camera_right)
+        right -= scene.matrix(plate) @ state.deviation
+    return scene.matrix(values), right
 
 
 def _reach(scene: Scene, cameras: Floats, freedom: Freedom) -> float:

@@ -13,8 +13,7 @@ from inspect3d.arrays import Floats, Integers
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
 from inspect3d.correlation.linear import noise_of, slides_of, system_of
-from inspect3d.correlation.normal import Facets, facets
-from inspect3d.correlation.picture import Stack
+from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.system import System
 
@@ -72,11 +71,15 @@ class Uncertainty:
         return self.variances - 2 * np.einsum("ij,ij->i", modes, crossed) + between
 
 
+def needed_columns(freedom: Freedom, systematic: Systematic | None) -> Integers:
+    """Return the camera parameters of each view that `uncertainty` needs the facets' derivatives by."""
+    return freedom.columns if systematic is None else np.union1d(freedom.columns, [SHIFT_X, SHIFT_Y])
+
+
 def uncertainty(
     scene: Scene,
-    stack: Stack,
+    found: Facets,
     views: Sequence[View],
-    deviation: Floats,
     weights: Floats,
     freedom: Freedom,
     systematic: Systematic | None,
@@ -89,20 +92,20 @@ def uncertainty(
 
     Parameters
     ----------
-    stack : the pictures without blur
+    found : what the pictures say about the facets without blur, by `needed_columns` and in the power 2, with each
+        facet's camera block where there is a systematic field
     weights : (f,) of the facets
     systematic : the field to propagate; its response is that of the estimate to a shift of picture k, H₀⁻¹ J'W h_k
     """
-    columns = freedom.columns
-    if systematic is not None:
-        columns = np.union1d(columns, [SHIFT_X, SHIFT_Y])
-    found = facets(scene, stack, views, deviation, weights, columns, power=2, whole=systematic is not None)
+    columns = needed_columns(freedom, systematic)
     noise = noise_of(found, weights, len(scene.nodes) + freedom.unknowns)
     factors = weights * found.clean**2
-    scale, slides = freedom.scale(views, scene.nodes), slides_of(scene, freedom, views)
+    scale, slides = freedom.scale(views, scene.sample), slides_of(scene, freedom, views)
     first = system_of(scene, found, factors, noise, freedom, columns, scale, slides)
     correlated = _correlated(scene, found, weights / noise, first, freedom.spread(columns)[0])
-    system = system_of(scene, found, factors, noise * correlated, freedom, columns, scale, slides)
+    system = first
+    if correlated > 1:
+        system = system_of(scene, found, factors, noise * correlated, freedom, columns, scale, slides)
     shifts = np.zeros((len(scene.nodes), 0))
     if systematic is not None:
         shares = weights * found.clean / (noise * correlated)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inspect3d.arrays import Booleans, Floats, unit
+from inspect3d.arrays import Booleans, Floats
 from inspect3d.camera import View
-from inspect3d.correlation.evaluation import EvaluationPoints
+from inspect3d.correlation.evaluation import EvaluationPoints, interpolated
 from inspect3d.nominal.nominal import InspectionMesh, Nominal
 
 MARGIN = 3.0
@@ -50,39 +50,39 @@ def visibility(
     views : v
     masks : of each view, True (rows, columns) where its picture may be used, or None
     """
-    triangles = nominal.mesh.triangles
-    normals = unit(np.einsum("pi,pij->pj", points.shapes, nominal.mesh.normals[triangles[points.facet]]))
-    seen = np.stack(
-        [_seen(nominal, points, normals, view, steepest, mask) for view, mask in zip(views, masks, strict=True)]
-    )
-    counts = np.stack([np.add.reduceat(row, points.starts[:-1], dtype=np.int64) for row in seen], axis=1)
-    taking = counts >= SHARE * np.diff(points.starts)[:, None]
-    taking[taking.sum(axis=1) < 2] = False
-    taken = taking[points.facet]
-    used = np.all(seen.T | ~taken, axis=1) & np.any(taken, axis=1)
+    from inspect3d.correlation.point_kernel import write_used
+
+    mesh = nominal.mesh
+    normals = interpolated(points.starts, points.shapes, mesh.triangles, mesh.normals, unit=True)
+    lifted = points.places + (LIFT * nominal.diagonal + 2 * points.chord) * normals
+    seen = np.empty((len(views), len(points)), dtype=np.bool_)
+    for row, view, mask in zip(seen, views, masks, strict=True):
+        _write_seen(nominal, points.places, normals, lifted, view, steepest, mask, row)
+    taking, used = np.empty((len(mesh.triangles), len(views)), dtype=np.bool_), np.empty(len(points), dtype=np.bool_)
+    write_used(points.starts, seen, SHARE, taking, used)
     return Visibility(seen, taking, used)
 
 
-def _seen(
-    nominal: Nominal, points: EvaluationPoints, normals: Floats, view: View, steepest: float, mask: Booleans | None
-) -> Booleans:
-    sight = view.centre - points.places
-    distance = np.linalg.norm(sight, axis=1)
-    seen = (sight * normals).sum(axis=1) >= np.cos(steepest) * distance
-    seen &= view.depth(points.places) > 0
-    near = np.flatnonzero(seen)
-    pixels = view.project(points.places[near])
-    inside = (pixels >= MARGIN).all(axis=1) & (pixels <= np.array(view.camera.size) - 1 - MARGIN).all(axis=1)
-    at = np.clip(np.rint(pixels), 0, np.array(view.camera.size) - 1).astype(np.int64)
-    inside &= _within_outline(nominal.mesh, view)[at[:, 1], at[:, 0]]
+def _write_seen(
+    nominal: Nominal,
+    places: Floats,
+    normals: Floats,
+    lifted: Floats,
+    view: View,
+    steepest: float,
+    mask: Booleans | None,
+    seen: Booleans,
+) -> None:
+    from inspect3d.correlation.point_kernel import write_in_sight
+
+    camera, pose = view.camera, view.camera_from_cad
+    rig = (camera.matrix, camera.distortion, pose.rotation, pose.translation)
+    allowed = _within_outline(nominal.mesh, view)
     if mask is not None:
-        inside &= mask[at[:, 1], at[:, 0]]
-    near = near[inside]
-    lift = LIFT * nominal.diagonal + 2 * points.chord
-    hits = nominal.surface.first_hit(points.places[near] + lift * normals[near], sight[near], distance[near])
-    seen[:] = False
-    seen[near] = hits.triangle < 0
-    return seen
+        allowed = allowed & mask
+    write_in_sight(places, normals, rig, view.centre, np.cos(steepest), MARGIN, allowed, seen)
+    near = np.flatnonzero(seen)
+    seen[near] = ~nominal.surface.hides(lifted[near], view.centre)
 
 
 def _within_outline(mesh: InspectionMesh, view: View) -> Booleans:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from inspect3d.arrays import Floats, Integers
+from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.nominal.bvh import BRANCH, LANES, STACK, Tree
 
 BATCH = 512
@@ -36,6 +36,55 @@ def first_hit(
                 ray[1, axis] = along
                 ray[2, axis] = 1.0 / (along if abs(along) > 1e-150 else 1e-150)
             distance[i], triangle[i] = _first(ray, reaches[i], tree, stack, bounds, lengths)
+
+
+@njit(cache=True, parallel=True)
+def between(points: Floats, target: Floats, tree: Tree, hidden: Booleans) -> None:
+    """Tell whether a triangle lies between each point and the target.
+
+    Parameters
+    ----------
+    points : (n, 3) mm
+    target : (3,) mm
+    tree : the arrays of `Tree`
+    hidden : (n,), written
+    """
+    for batch in prange((len(points) + BATCH - 1) // BATCH):
+        stack, lengths, ray = np.empty(STACK, dtype=np.int64), np.empty(LANES), np.empty((3, 3))
+        for i in range(batch * BATCH, min((batch + 1) * BATCH, len(points))):
+            squared = 0.0
+            for axis in range(3):
+                squared += (target[axis] - points[i, axis]) ** 2
+            reach = np.sqrt(squared)
+            for axis in range(3):
+                along = (target[axis] - points[i, axis]) / reach
+                ray[0, axis] = points[i, axis] - tree.origin[axis]
+                ray[1, axis] = along
+                ray[2, axis] = 1.0 / (along if abs(along) > 1e-150 else 1e-150)
+            hidden[i] = _met(ray, reach, tree, stack, lengths)
+
+
+@njit(cache=True)
+def _met(ray: Floats, reach: float, tree: Tree, stack: Integers, lengths: Floats) -> bool:
+    """Tell whether a ray meets any triangle within its reach."""
+    boxes, links = tree.boxes, tree.links
+    stack[0] = 0
+    waiting = 1
+    while waiting > 0:
+        waiting -= 1
+        node = stack[waiting]
+        if box_entry(ray, boxes, node) > reach:
+            continue
+        first = links[node, 1]
+        if links[node, 0] == BRANCH:
+            stack[waiting], stack[waiting + 1] = first, first + 1
+            waiting += 2
+            continue
+        write_lengths(ray, tree.packets[first], tree.packets.shape[2], lengths)
+        for lane in range(LANES):
+            if lengths[lane] <= reach:
+                return True
+    return False
 
 
 @njit(cache=True)

@@ -207,6 +207,17 @@ class Surface:
         first_hit(origins, unit(directions), reaches, self._tree, hits.distance, hits.triangle)
         return hits
 
+    def hides(self, points: ArrayLike, target: ArrayLike) -> Booleans:
+        """Tell from which of points (n, 3) mm the surface hides a target (3,) mm; see `first_hit`, which is slower."""
+        from inspect3d.nominal.ray_kernel import between
+
+        points, target = floats(points, "points", None, 3), floats(target, "target", 3)
+        if (points == target).all(axis=1).any():
+            raise ValueError("a point is the target itself")
+        hidden = np.empty(len(points), dtype=np.bool_)
+        between(points, target, self._tree, hidden)
+        return hidden
+
     @cached_property
     def _corners(self) -> Floats:
         return self.vertices[self.triangles]
