@@ -18,6 +18,7 @@ from inspect3d.correlation.picture import Interpolation, Pictures
 from inspect3d.correlation.scene import Scene, scene
 from inspect3d.correlation.shape import Shape
 from inspect3d.correlation.solver import COARSE, ON_NOMINAL, Level, Solver, State, Step, held
+from inspect3d.correlation.texture import speckle_size
 from inspect3d.correlation.uncertainty import Systematic, needed_columns, uncertainty
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
@@ -92,6 +93,7 @@ class Correlate:
         _require_sizes(pictures, views)
         _require_different(pictures)
         seen = self._scene(nominal, views, masks)
+        _require_coarse(seen, pictures, views)
         known = Freedom("known", tuple(Lens() for _ in views), tuple(views), seen.centre)
         freedom = freedom or known
         levels = self.levels or (JOINT if freedom.unknowns else SHAPE)
@@ -137,6 +139,24 @@ class Correlate:
         """Tell which facets agree between the pictures, (f,)."""
         median = np.median(found.noise)
         return (found.correlation >= self.poorest) & (found.noise <= NOISY * median)
+
+
+def _require_coarse(seen: Scene, pictures: Pictures, views: Sequence[View]) -> None:
+    """Refuse facets that are smaller than the dots of the speckle: they show nothing to compare."""
+    dots, edges = [], []
+    sides = seen.triangles[:, :2]
+    for grey, view in zip(pictures.grey, views, strict=True):
+        places = view.project(seen.nodes)
+        dots.append(speckle_size(np.asarray(grey, dtype=np.float64), places))
+        edges.append(float(np.median(np.linalg.norm(places[sides[:, 1]] - places[sides[:, 0]], axis=1))))
+    dot, edge = max(dots), min(edges)
+    if edge < dot:
+        size = float(np.median(np.linalg.norm(seen.nodes[sides[:, 1]] - seen.nodes[sides[:, 0]], axis=1)))
+        raise MeasurementError(
+            f"The mesh is too fine for the speckle: its elements are {edge:.1f} px wide in the pictures, and the dots "
+            f"{dot:.1f} px. Choose an element_size of {size * 3 * dot / edge:.2g} mm or more (it is {size:.2g} mm), or "
+            "paint a finer speckle."
+        )
 
 
 def _require_sizes(pictures: Pictures, views: Sequence[View]) -> None:

@@ -56,6 +56,11 @@ class Scene:
         return self.nodes[:: 1 + len(self.nodes) // SAMPLE]
 
     @cached_property
+    def extent(self) -> float:
+        """Return the diagonal of the nodes' bounding box, mm."""
+        return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
+
+    @cached_property
     def adjacency(self) -> sparse.csr_matrix:
         """Return a one for every pair of neighbours, (n, n)."""
         ends = np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])

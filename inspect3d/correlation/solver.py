@@ -23,6 +23,7 @@ from inspect3d.register.mobility import spread
 
 SHORTER, LONGER, LEAST, PATIENCE = 0.5, 1.2, 0.02, 4
 COARSE = 5e-4
+RUNAWAY = 0.3  # of the extent of what is seen: a step that large leads nowhere
 VAGUE = 1e-6  # share of the stiffest motion's stiffness; softer ones are held while the shape is
 Moves = Literal["poses", "cameras", "shape", "both"]
 ON_NOMINAL = ("poses", "cameras")
@@ -163,6 +164,12 @@ class Solver:
             )
             if count >= PATIENCE:
                 factor = max(factor * SHORTER, LEAST) if shape @ last < 0 else min(factor * LONGER, 1.0)
+            if not change < RUNAWAY * scene.extent:
+                raise MeasurementError(
+                    "The solution runs away from the nominal shape: check that the pictures show this part with its "
+                    "speckle, in the order of the cameras, and that these start within half a speckle of where they "
+                    "belong."
+                )
             step = Step(level, change, float(np.sqrt(noise)))
             told(step)
             state = State(
