@@ -76,12 +76,13 @@ class Setup:
 
     Parameters
     ----------
-    part : freeform or milled (there without scallops, which no mesh as coarse as these resolves)
+    part : freeform or milled
     cameras : how many
     full : 5 megapixels in place of a quarter of that
     element : mm
     noise : share of full scale
     tau, length : px and mm on the part, of a smooth systematic shift of each picture; tau 0: none
+    scallop : mm, height of the scallops of the milled part; by default none, since coarse meshes do not resolve them
     """
 
     part: str = "freeform"
@@ -91,6 +92,7 @@ class Setup:
     noise: float = 0.01
     tau: float = 0.0
     length: float = 25.0
+    scallop: float = 0.0
 
     @property
     def rig(self) -> StereoRig:
@@ -100,7 +102,8 @@ class Setup:
 
     def dataset(self, seed: int) -> PictureDataset:
         """Return the part before its cameras."""
-        made = smooth_stereo(seed, self.rig) if self.part == "freeform" else milled_stereo(seed, self.rig, scallop=0.0)
+        smooth = self.part == "freeform"
+        made = smooth_stereo(seed, self.rig) if smooth else milled_stereo(seed, self.rig, self.scallop)
         if self.tau == 0.0:
             return made
         warps = [Warp(self.tau, self.length * self.rig.scale, 97 * seed + k) for k in range(len(made.cameras))]
