@@ -12,9 +12,20 @@ from inspect3d.arrays import Floats, Integers, floats
 from inspect3d.camera import View
 from inspect3d.pose import Pose
 
-POSE, LENS = 6, 9
+POSE, LENS = 6, 10
 EXACT = 1e-9  # rad or mm
+FY = 7
+COLUMNS = ((6, FY), (8,), (9,), (10,), (11,), (12,), (13,), (14,), (FY,), (15,))
+"""The kernel's numbers of the parameters that change with each of focal, cx, cy, k1, k2, p1, p2, k3, aspect, skew."""
 DISTORTION = ("k1", "k2", "p1", "p2", "k3")
+LENS_PARTS = (
+    "focal length",
+    "principal point x",
+    "principal point y",
+    *(f"distortion {c}" for c in DISTORTION),
+    "aspect",
+    "skew",
+)
 Poses = Literal["known", "common", "free"]
 
 
@@ -24,19 +35,27 @@ class Lens:
 
     Parameters
     ----------
-    focal : px, of fx and fy together; their ratio is exact
+    focal : px, of fx and fy together, their ratio kept
     centre : px, of each coordinate of the principal point
     distortion : (5,), of k1, k2, p1, p2, k3
+    aspect : px, of fy beyond what its ratio to fx makes it
+    skew : px, of how far the rows lean
+
+    Notes
+    -----
+    With focal, centre, aspect and skew unknown and no distortion, a view is a free 3 x 4 matrix (paper, eqs. 4 to 6).
     """
 
     focal: float = 0.0
     centre: float = 0.0
     distortion: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    aspect: float = 0.0
+    skew: float = 0.0
 
     @property
     def sigmas(self) -> Floats:
-        """Return the uncertainties of (focal, cx, cy, k1, k2, p1, p2, k3), (8,)."""
-        return np.array([self.focal, self.centre, self.centre, *self.distortion])
+        """Return the uncertainties of (focal, cx, cy, k1, k2, p1, p2, k3, aspect, skew), (10,)."""
+        return np.array([self.focal, self.centre, self.centre, *self.distortion, self.aspect, self.skew])
 
 
 @dataclass(frozen=True)
@@ -63,7 +82,7 @@ class Freedom:
     """The unknowns of the cameras, and the priors of their lenses and places.
 
     A pose is changed by a small motion of the part in the CAD frame, about `origin`, before it is photographed: turns
-    and shifts (rad, mm). A lens is changed by (focal, cx, cy, k1, k2, p1, p2, k3).
+    and shifts (rad, mm). A lens is changed by (focal, cx, cy, k1, k2, p1, p2, k3, aspect, skew).
 
     Parameters
     ----------
@@ -93,7 +112,7 @@ class Freedom:
     def columns(self) -> Integers:
         """Return the parameters of a view that the kernel must differentiate by, in its numbering."""
         open_lens = np.any([lens.sigmas > 0 for lens in self.lenses], axis=0)
-        lens = [*((6, 7) if open_lens[0] else ()), *(7 + k for k in range(1, 8) if open_lens[k])]
+        lens = np.unique([column for k in np.flatnonzero(open_lens) for column in COLUMNS[k]])
         moving = self.poses != "known" or any(stand.sigmas.any() for stand in self.stands)
         return np.array([*(range(POSE) if moving else ()), *lens], dtype=np.int64)
 
@@ -130,12 +149,9 @@ class Freedom:
                     row = np.zeros((views, c))
                     sigmas.append(float(sigma))
                     rows.append(row)
-                    if (6 if number == 0 else 7 + number) not in at:
-                        continue
-                    if number == 0:
-                        row[k, at[6]], row[k, at[7]] = 1.0, matrix[1, 1] / matrix[0, 0]
-                    else:
-                        row[k, at[7 + number]] = 1.0
+                    chosen = [column for column in COLUMNS[number] if column in at]
+                    for column in chosen:
+                        row[k, at[column]] = matrix[1, 1] / matrix[0, 0] if number == 0 and column == FY else 1.0
         return np.array(rows).reshape(len(rows), views * c).T, np.array(sigmas)
 
     @property
@@ -145,9 +161,8 @@ class Freedom:
         bodies = {"known": (), "common": ("the part",), "free": tuple(f"view {k + 1}" for k in range(len(self.lenses)))}
         names = [f"{motion} of {body}" for body in bodies[self.poses] for motion in motions]
         names += [f"{motions[motion]} of view {k + 1}" for k, motion, _ in self._loose]
-        parts = ("focal length", "principal point x", "principal point y", *(f"distortion {c}" for c in DISTORTION))
         for k, lens in enumerate(self.lenses):
-            names += [f"{part} of view {k + 1}" for part, sigma in zip(parts, lens.sigmas, strict=True) if sigma > 0]
+            names += [f"{p} of view {k + 1}" for p, sigma in zip(LENS_PARTS, lens.sigmas, strict=True) if sigma > 0]
         return tuple(names)
 
     def scale(self, views: Sequence[View], points: Floats) -> Floats:
@@ -201,7 +216,7 @@ class Freedom:
 
     def _moved(self, view: View, change: Floats) -> View:
         matrix = view.camera.matrix + np.array(
-            [[change[6], 0.0, change[8]], [0.0, change[7], change[9]], [0.0, 0.0, 0.0]]
+            [[change[6], change[15], change[8]], [0.0, change[7], change[9]], [0.0, 0.0, 0.0]]
         )
         camera = replace(view.camera, matrix=matrix, distortion=view.camera.distortion + change[10:15])
         return View(camera, view.camera_from_cad @ Pose.small(change[:6], self.origin))
@@ -217,6 +232,8 @@ class Freedom:
         for lens, view, prior in zip(self.lenses, views, self.priors, strict=True):
             change = view.camera.matrix - prior.camera.matrix
             bent = view.camera.distortion - prior.camera.distortion
-            offsets = np.array([change[0, 0], change[0, 2], change[1, 2], *bent])
+            ratio = prior.camera.matrix[1, 1] / prior.camera.matrix[0, 0]
+            aspect = change[1, 1] - ratio * change[0, 0]
+            offsets = np.array([change[0, 0], change[0, 2], change[1, 2], *bent, aspect, change[0, 1]])
             found += list(offsets[lens.sigmas > 0])
         return np.array(found)

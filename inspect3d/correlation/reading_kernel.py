@@ -138,10 +138,10 @@ def _motion(column: int, x: float, y: float, z: float) -> tuple[float, float, fl
 
 @njit(cache=True, error_model="numpy")
 def lens_slope(column: int, matrix: Floats, distortion: Floats, x: float, y: float) -> tuple[float, float]:
-    """Return the derivative (dx, dy) of the pixel of (x, y, 1) by fx, fy, cx, cy (6 to 9), k1, k2, p1, p2, k3."""
-    if column == 6 or column == 7:
+    """Return the derivative (dx, dy) of the pixel of (x, y, 1) by fx, fy, cx, cy (6 to 9), k1 to k3 (to 14), skew."""
+    if column == 6 or column == 7 or column == 15:
         u, v, _, _, _ = distort(x, y, distortion)
-        return (u, 0.0) if column == 6 else (0.0, v)
+        return (0.0, v) if column == 7 else (u if column == 6 else v, 0.0)
     if column == 8 or column == 9:
         return (1.0, 0.0) if column == 8 else (0.0, 1.0)
     squared = x * x + y * y

@@ -53,16 +53,17 @@ def smooth_stereo(
     return _dataset(freeform(sizes), deviation, rig or StereoRig(), tuple(middle.tolist()), seed, recipe)
 
 
-def milled_stereo(seed: int) -> PictureDataset:
+def milled_stereo(seed: int, rig: StereoRig | None = None, scallop: float = 0.012) -> PictureDataset:
     """Return the milled block: 40 µm mismatch, 15 µm errors on the facets, 12 µm scallops; cameras known."""
     sizes = MilledSizes()
     low, high = (sizes.facet_borders[0], -1.0, 1.0), (sizes.length + 1.0, sizes.width + 1.0, sizes.length)
     mismatch = Step(0.040, point=(sizes.section_start, 0.0, 0.0), normal=(1.0, 0.0, 0.0))
     facets = FacetErrors(sizes.facet_borders, heights=(0.015, -0.015, 0.015, -0.015), direction=(1.0, 0.0, 0.0))
-    scallops = Scallops(0.012, pitch=4.0, direction=(1.0, 0.0, 0.0))
+    scallops = Scallops(scallop, pitch=4.0, direction=(1.0, 0.0, 0.0))
     deviation = Within(mismatch + facets + scallops, low, high)
     recipe = HEAD.format(title="Milled block", name="milled-stereo", element_size=2.0) + CAMERAS + PLACED
-    return _dataset(milled(sizes), deviation, StereoRig(), (sizes.length / 2, sizes.width / 2, 26.0), seed, recipe)
+    middle = (sizes.length / 2, sizes.width / 2, 26.0)
+    return _dataset(milled(sizes), deviation, rig or StereoRig(), middle, seed, recipe)
 
 
 def knowing(dataset: PictureDataset, knowledge: CameraKnowledge | None, picked: int = 6) -> PictureDataset:
