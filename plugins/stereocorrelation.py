@@ -31,6 +31,7 @@ from inspect3d.recipe import Start
 ROUGH, WIDE = 0.05, 0.3  # relative uncertainty of a focal length that is given, and of one that the picks gave
 CENTRE = 0.025  # of the picture's width: uncertainty of a principal point that is taken to be in the middle
 DISTORTION = (0.2, 0.3, 1e-3, 1e-3, 0.0)  # uncertainties of k1, k2, p1, p2, k3 of a lens nobody calibrated
+PULLED = 5.0  # standard uncertainties by which a camera may differ from what was known without a word
 LOUD = 0.1  # px, disagreement of the pictures that the reader must hear of
 PATCH = 0.125  # of the part's size: length over which the systematic shift of a picture stays alike
 
@@ -177,7 +178,7 @@ class Stereocorrelation:
             hidden=tuple(motion.words for motion in shape.hidden),
             contributions=_contributions(shape),
             figures=illustrated(nominal, shape, begin.views, grey, steps, begin.picks),
-            remarks=(*source.remarks, *begin.remarks, *_remarks(shape)),
+            remarks=(*source.remarks, *begin.remarks, *_remarks(shape), *_pulled(shape, begin.freedom)),
         )
 
     def _correlate(self, nominal: Nominal) -> Correlate:
@@ -358,6 +359,18 @@ def _contributions(shape: Shape) -> tuple[tuple[str, str, str], ...]:
         words = "motions that the pictures tell weakly, which the priors of the cameras bound; named below"
         found.append(("cameras", f"{size:.2g} µm rms over the map", words))
     return tuple(found)
+
+
+def _pulled(shape: Shape, freedom: Freedom) -> tuple[str, ...]:
+    """Return by how much the pictures contradict what was known of the cameras, where that is a lot."""
+    _, sigmas = freedom.spread(freedom.columns)
+    pulls = np.abs(freedom.offset(shape.views)) / sigmas
+    if not len(pulls) or pulls.max() < PULLED:
+        return ()
+    return (
+        f"The pictures move the {freedom.names[int(np.argmax(pulls))]} by {pulls.max():.0f} standard uncertainties from "
+        "what was known of it: the cameras are known less well than is stated.",
+    )
 
 
 def _remarks(shape: Shape) -> tuple[str, ...]:

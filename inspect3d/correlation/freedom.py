@@ -198,6 +198,22 @@ class Freedom:
             if sigma > 0
         ]
 
+    @property
+    def redundant(self) -> Floats:
+        """Return changes (m, r) that say nothing new: the stands of a rig moving together, which moves the part.
+
+        They are weighted as the priors would share them out.
+        """
+        if self.poses != "common":
+            return np.zeros((self.unknowns, 0))
+        found = np.zeros((self.unknowns, POSE))
+        together = np.zeros(POSE, dtype=np.int64)
+        for row, (_, motion, sigma) in enumerate(self._loose, start=POSE):
+            found[row, motion] = 1 / sigma**2
+            together[motion] += 1
+        found = found[:, together == len(self.priors)]
+        return found / np.linalg.norm(found, axis=0)
+
     def _moved_stands(self, views: Sequence[View]) -> Floats:
         """Return how far each view has moved from its prior, (v, 6), about the datum.
 

@@ -117,4 +117,4 @@ def system_of(
     mixing, sigmas = freedom.spread(columns)
     cross = scene.gathered(found.cross * (factors / noise)[:, None, None]) @ mixing
     camera = mixing.T @ found.camera @ mixing / noise
-    return System(nodal, cross, camera, gauge, 1 / sigmas**2, scale, slides)
+    return System(nodal, cross, camera, gauge, 1 / sigmas**2, scale, slides, freedom.redundant)

@@ -29,7 +29,8 @@ class System:
     gauge : C (n, g), orthonormal columns, which may be none
     prior : (m,) the diagonal of P
     scale : (m,) the units of the unknowns p in which their stiffnesses compare
-    slides : (m, s) changes of the cameras that are held
+    slides : (m, s) changes of the cameras that no picture shows, held
+    redundant : (m, r) changes of the cameras that others stand for, held
     """
 
     nodal: Factor
@@ -39,6 +40,7 @@ class System:
     prior: Floats
     scale: Floats
     slides: Floats
+    redundant: Floats
 
     @cached_property
     def held(self) -> tuple[Floats, Floats]:
@@ -71,8 +73,9 @@ class System:
         if not len(self.scale):
             return np.zeros((0, 0)), np.zeros((0, 0))
         both = self.scale * self.scale[:, None]
-        slides = np.linalg.qr(self.slides / self.scale[:, None])[0]
-        others = np.linalg.qr(np.column_stack([slides, np.eye(len(slides))]))[0][:, slides.shape[1] :]
+        held = np.column_stack([self.slides, self.redundant]) / self.scale[:, None]
+        turned, _ = np.linalg.qr(held, mode="complete")
+        slides, others = turned[:, : self.slides.shape[1]], turned[:, held.shape[1] :]
         values, modes = np.linalg.eigh(others.T @ (self.reduced * both) @ others)
         modes = others @ modes
         silent = values <= NOTHING * float(np.linalg.eigvalsh(self.camera * both)[-1])
