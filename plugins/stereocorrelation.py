@@ -368,8 +368,8 @@ def _pulled(shape: Shape, freedom: Freedom) -> tuple[str, ...]:
     if not len(pulls) or pulls.max() < PULLED:
         return ()
     return (
-        f"The pictures move the {freedom.names[int(np.argmax(pulls))]} by {pulls.max():.0f} standard uncertainties from "
-        "what was known of it: the cameras are known less well than is stated.",
+        f"The pictures move the {freedom.names[int(np.argmax(pulls))]} by {pulls.max():.0f} standard uncertainties "
+        "from what was known of it: the cameras are known less well than is stated.",
     )
 
 

@@ -14,6 +14,7 @@ MAD = 1.4826
 TUKEY = 4.685
 FREE = 1e-3  # share of the stiffest motion's stiffness below which a motion is free
 SOFT = 1e-2  # share of the stiffest motion's stiffness below which a motion is soft
+ROUNDED = 1e-9  # share of a variance below which a difference of variances is rounding
 OFFSET = 3.0  # robust scales that a uniform deviation must have to count as one
 
 
@@ -115,10 +116,11 @@ class Gauge:
         return values - self.jacobian @ (self.solver @ values)
 
     def variances(self, independent: Floats) -> Floats:
-        """Return the diagonal of G S G' for a diagonal S (n,) mm²."""
+        """Return the diagonal of G S G' for a diagonal S (n,) mm²; of a node that the fit goes through, nearly zero."""
         common = (self.solver * independent) @ self.solver.T
         cross = np.einsum("ij,ji->i", self.jacobian, self.solver) * independent
-        return independent - 2 * cross + np.einsum("ij,jk,ik->i", self.jacobian, common, self.jacobian)
+        found = independent - 2 * cross + np.einsum("ij,jk,ik->i", self.jacobian, common, self.jacobian)
+        return np.maximum(found, ROUNDED * independent)
 
     def covariance(self, residuals: Floats, block: float) -> Floats:
         """Return the covariance of the motion, (6, 6) or with growth (7, 7), from a sandwich over spatial blocks.
