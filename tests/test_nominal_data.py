@@ -79,19 +79,29 @@ def test_nodes_of_a_step_file_lie_on_the_face_that_owns_them(data: Path, name: s
 
 
 @pytest.mark.parametrize("name", STEP)
-def test_a_crease_is_no_farther_from_the_faces_beside_than_the_edge_allows_or_gapes(data: Path, name: str) -> None:
+def test_a_crease_is_within_the_tolerance_of_its_edge_of_every_face_beside(data: Path, name: str) -> None:
     part, mesh = coarse(data / name)
     for face, node in zip(mesh.face[mesh.crease].tolist(), mesh.nodes[mesh.crease], strict=True):
         assert edges_at(part, face, node)
-        assert all(found.off <= max(found.tolerance, found.gape) + 1e-9 for found in beside(part, face, node))
+        assert all(found.off <= found.tolerance + 1e-9 for found in beside(part, face, node))
+
+
+def test_a_crease_is_farther_only_where_the_borders_in_the_file_gape_by_more(data: Path) -> None:
+    part = read_brep(data / "step_freeform/occt_screw.step")
+    size = part.diagonal / 60
+    mesh, _ = mesh_on_brep(tessellated(part, size / 50), size)
+    creases = zip(mesh.face[mesh.crease].tolist(), mesh.nodes[mesh.crease], strict=True)
+    found = [one for face, node in creases for one in beside(part, face, node)]
+    beyond = [one for one in found if one.off > one.tolerance + 1e-9]
+    assert 0 < len(beyond) < 0.02 * len(found)
+    assert all(one.off < one.gape + 1e-9 for one in beyond)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", IGES)
 def test_an_iges_file_gives_an_inspection_mesh(data: Path, name: str) -> None:
     part, mesh = coarse(data / "step_freeform" / name)
-    feet, _ = part.project(mesh.nodes, mesh.face)
-    assert np.linalg.norm(feet - mesh.nodes, axis=1).max() < 1e-6
+    assert max(distance(part, int(face), node) for face, node in zip(mesh.face, mesh.nodes, strict=True)) < 1e-6
     assert len(mesh) > 200
 
 
