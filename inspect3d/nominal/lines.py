@@ -18,6 +18,9 @@ from inspect3d.nominal.tessellation import Tessellation
 _GAPE = 1e-8
 """Faces that gape by more than this, mm, leave doubt who owns the nodes between them."""
 
+_OFF = 5e-7
+"""So does an edge or a vertex that may be farther than this, mm, from the borders of its faces."""
+
 
 class Placed(NamedTuple):
     """Nodes on the exact part.
@@ -86,8 +89,10 @@ class Lines:
         """Return the exact places of vertices, on the face of the lowest number there that holds the place."""
         around = [self._faces_around(v) for v in vertex.tolist()]
         points, face = np.empty((len(vertex), 3)), np.zeros(len(vertex), dtype=np.int64)
+        brep, places = self.tessellation.brep, self.tessellation.vertices[vertex]
         for row, (faces, uv) in enumerate(around):
-            points[row : row + 1], face[row : row + 1] = _owned(self.tessellation.brep, faces[None], uv[None])
+            off = np.linalg.norm(brep.points_at(faces[:1], uv[:1]) - places[row], axis=1) > _OFF
+            points[row : row + 1], face[row : row + 1] = _owned(brep, faces[None], uv[None], off)
         return Placed(points, self._vertex_normals[vertex], face, self._folded[vertex])
 
     def at_segments(self, segment: Integers, share: Floats, nodes: Floats) -> Placed:
@@ -102,7 +107,9 @@ class Lines:
         share : (k,) how far along it, to start from
         """
         on_edges = self._on_edges(segment, share, nodes)
-        points, face = _owned(self.tessellation.brep, on_edges.faces, on_edges.uv)
+        brep = self.tessellation.brep
+        off = brep.edge_tolerance[self.tessellation.segment_edge[segment]] > _OFF
+        points, face = _owned(brep, on_edges.faces, on_edges.uv, off)
         return Placed(points, on_edges.normals, face, on_edges.crease)
 
     def across(self, segment: Integers, face: Integers) -> Integers:
@@ -210,18 +217,19 @@ class Lines:
         return self._curves[edge, face]
 
 
-def _owned(brep: Brep, faces: Integers, uv: Floats) -> tuple[Floats, Integers]:
+def _owned(brep: Brep, faces: Integers, uv: Floats, off: Booleans) -> tuple[Floats, Integers]:
     """Return places on the common border of faces, (n, 3) mm, and the numbers (n,) of the faces that own them.
 
     Parameters
     ----------
     faces : (n, k) numbers, the one to prefer first
     uv : (n, k, 2) parameters of the border on each
+    off : (n,) the edge or the vertex may be elsewhere than the borders
     """
     n, k = faces.shape
     border = brep.points_at(faces.ravel(), uv.reshape(-1, 2)).reshape(n, k, 3)
     points, face = border[:, 0].copy(), faces[:, 0].copy()
-    doubtful = np.flatnonzero(np.linalg.norm(border - border[:, :1], axis=2).max(axis=1) > _GAPE)
+    doubtful = np.flatnonzero(off | (np.linalg.norm(border - border[:, :1], axis=2).max(axis=1) > _GAPE))
     met_uv = meeting(brep, border[doubtful].mean(axis=1), faces[doubtful], uv[doubtful])
     for row, met in zip(doubtful.tolist(), met_uv, strict=True):
         points[row], face[row] = _between(brep, faces[row], border[row], uv[row], met)
