@@ -25,6 +25,7 @@ PATIENCE = 120.0
 MODULES = {
     "cadquery-ocp-novtk": "OCP",
     "opencv-python-headless": "cv2",
+    "pillow": "PIL",
     "vtk": "vtkmodules",
 }
 """The packages that are imported under another name than their own."""

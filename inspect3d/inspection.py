@@ -38,7 +38,7 @@ from inspect3d.registry import build_for
 
 REFERENCE = 20.0  # degC at which dimensions hold (ISO 1)
 BARE = Coating(thickness=0.0)
-LIBRARIES = ("numpy", "scipy", "numba", "open3d", "pyvista", "pymeshlab", "cadquery-ocp-novtk")
+LIBRARIES = ("numpy", "scipy", "numba", "open3d", "pyvista", "pymeshlab", "trimesh", "cadquery-ocp-novtk")
 
 
 @dataclass(frozen=True, eq=False)

@@ -88,6 +88,8 @@ def test_a_broken_cloud_is_refused_with_a_sentence(tmp_path: Path, name: str, da
     assert "\n" not in sentence
 
 
+LOOP = "outer loop\nvertex 0 0 0\nvertex {} 0 0\nvertex 0 1 0\n{}endloop"
+FACET = f"solid a\nfacet normal 0 0 1\n{LOOP}\nendfacet\nendsolid a\n"
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 MODEL = (
     '<model unit="{0}"><resources><object id="1"><mesh><vertices>{1}</vertices><triangles>{2}</triangles></mesh>{3}'
@@ -120,12 +122,24 @@ ITEM = '<item objectid="1"/>'
             PLY.format(3).replace("end_header\n", FACES.format(1)) + "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n",
             "vertex 3",
         ),
-        ("a.ply", PLY.format(3).replace("end_header\n", FACES.format(9)) + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "9 rows"),
+        (
+            "idx.ply",
+            PLY.format(3).replace("end_header\n", FACES.format(1)) + "0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n",
+            "vertex -1",
+        ),
+        (
+            "cut.ply",
+            PLY.format(3).replace("end_header\n", FACES.format(9)) + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+            "9 rows",
+        ),
         (
             "a.stl",
             "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n",
             "begins 1 facets and ends 0",
         ),
+        ("two.stl", FACET.format(1, "") + FACET.format(2, "")[:-20], "begins 2 facets and ends 1"),
+        ("quad.stl", 3 * FACET.format(1, "vertex 1 1 0\n"), "a facet that is not a triangle"),
+        ("word.stl", FACET.format("one", ""), "a corner without three numbers"),
         ("a.stl", bytes(80) + struct.pack("<I", 2**31) + bytes(100), "declares 2147483648 triangles and holds 2"),
         ("a.stl", b"no STL", "fewer than the header"),
     ],

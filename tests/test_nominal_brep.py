@@ -261,6 +261,7 @@ def test_regions_find_the_nodes_of_a_face_by_its_number(tmp_path: Path) -> None:
         ("part.step", lambda text: text[: len(text) // 2], "cut off"),
         ("part.step", lambda text: b"", "not a STEP file"),
         ("part.step", lambda text: text.replace(b"ADVANCED_FACE", b"", 1).replace(b"#20 = ", b"#99999 = "), "damaged"),
+        ("part.step", lambda text: text.replace(b" VECTOR(", b" DIRECTION(", 1), "wrong Line"),
         ("part.igs", lambda text: b"hello\n", "not an IGES file"),
         ("part.igs", lambda text: text[: len(text) // 2], "cut off"),
     ],

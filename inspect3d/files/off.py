@@ -1,4 +1,8 @@
-"""OFF files (ascii)."""
+"""OFF files (ascii).
+
+Not through trimesh, which folds concave faces over (`dart.off` in tests/test_files_roundtrip.py), misses faces that the
+header declares and drops normals.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""3MF files."""
+"""3MF files.
+
+Not through trimesh, which needs networkx and lxml for them and builds support structures as if they were the part.
+"""
 
 from __future__ import annotations
 

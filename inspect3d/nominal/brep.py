@@ -133,9 +133,15 @@ class Brep:
         return np.array([region.State() == TopAbs_State.TopAbs_IN for region in regions], dtype=bool)
 
     def owned(self, face: int, uv: Floats) -> Floats:
-        """Return the point (3,) at the parameters uv (2,) on the border of a face, or one a hair within the face.
+        """Return the point (3,) at the parameters uv (2,) on the border of a face, or one a hair within the face."""
+        at = self.held(face, uv)
+        return self.points_at(np.array([face]), uv[None])[0] if at is None else at
 
-        Where a face gapes from its edges, OpenCASCADE measures from a point on its border to the edge, not to the face.
+    def held(self, face: int, uv: Floats) -> Floats | None:
+        """Return the first point (3,) around the parameters uv (2,) that OpenCASCADE finds on a trimmed face.
+
+        Where a face gapes from its edges, OpenCASCADE measures from a point on its border to the edge, not to the face,
+        and finds only points a hair within the face.
         """
         from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
         from OCP.BRepExtrema import BRepExtrema_DistShapeShape
@@ -149,7 +155,7 @@ class Brep:
             vertex = BRepBuilderAPI_MakeVertex(near).Vertex()
             if BRepExtrema_DistShapeShape(vertex, self.faces[face - 1]).Value() < _OWNED:
                 return np.array(near.Coord())
-        return np.array(point.Coord())
+        return None
 
     def _in_range(self, face: int, uv: list[float]) -> tuple[float, float]:
         """Return the parameters less whole periods, so that they lie in the range of the face."""

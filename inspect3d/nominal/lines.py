@@ -10,12 +10,16 @@ import numpy as np
 
 from inspect3d.arrays import Booleans, Floats, Integers, unit
 from inspect3d.nominal.brep import Brep
+from inspect3d.nominal.meeting import meeting
 from inspect3d.nominal.remeshing import FEATURE_ANGLE
 from inspect3d.nominal.sharp import corners_of_lines, sides_of
 from inspect3d.nominal.tessellation import Tessellation
 
-_GAPE = 5e-7
-"""A border that may gape by more than this, mm, leaves doubt who owns its nodes."""
+_GAPE = 1e-8
+"""Faces that gape by more than this, mm, leave doubt who owns the nodes between them."""
+
+_OFF = 5e-7
+"""So does an edge or a vertex that may be farther than this, mm, from the borders of its faces."""
 
 
 class Placed(NamedTuple):
@@ -36,9 +40,9 @@ class Placed(NamedTuple):
 
 
 class _OnEdges(NamedTuple):
-    """Places on edges: their owners, the parameters there, the mean normals, and whether the faces make a crease."""
+    """Places on edges: both faces, the owner first, the parameters there, mean normals, and if the faces crease."""
 
-    face: Integers
+    faces: Integers
     uv: Floats
     normals: Floats
     crease: Booleans
@@ -82,23 +86,20 @@ class Lines:
         return self.tessellation.vertices[pieces[:, 0]], self.tessellation.vertices[pieces[:, 1]]
 
     def at_vertices(self, vertex: Integers) -> Placed:
-        """Return the exact places of vertices, on the face of the lowest number there."""
-        mesh = self.tessellation
-        last_first = np.argsort(-mesh.face, kind="stable")
-        owner = np.zeros((len(mesh.vertices), 2), dtype=np.int64)
-        corners = np.stack([np.repeat(last_first, 3), np.tile(np.arange(3), len(last_first))], axis=1)
-        owner[mesh.triangles[last_first].ravel()] = corners
-        triangle, corner = owner[vertex].T
-        face = mesh.face[triangle]
-        uv = mesh.uv[triangle, corner]
-        points = mesh.brep.points_at(face, uv)
-        gape = np.linalg.norm(points - mesh.vertices[vertex], axis=1)
-        _own(mesh.brep, points, face, uv, gape > _GAPE)
+        """Return the exact places of vertices, on the face of the lowest number there that holds the place."""
+        around = [self._faces_around(v) for v in vertex.tolist()]
+        points, face = np.empty((len(vertex), 3)), np.zeros(len(vertex), dtype=np.int64)
+        brep, places = self.tessellation.brep, self.tessellation.vertices[vertex]
+        for row, (faces, uv) in enumerate(around):
+            off = np.linalg.norm(brep.points_at(faces[:1], uv[:1]) - places[row], axis=1) > _OFF
+            points[row : row + 1], face[row : row + 1] = _owned(brep, faces[None], uv[None], off)
         return Placed(points, self._vertex_normals[vertex], face, self._folded[vertex])
 
     def at_segments(self, segment: Integers, share: Floats, nodes: Floats) -> Placed:
-        """Return the exact points of edges nearest to nodes (k, 3) mm, on the face they gape from least,
-        or of two the one with the lower number.
+        """Return the exact points of edges nearest to nodes (k, 3) mm.
+
+        Where the faces beside gape, that is where they meet, if one of them holds that place; otherwise it is on the
+        face they gape from least, or of two the one with the lower number.
 
         Parameters
         ----------
@@ -106,9 +107,9 @@ class Lines:
         share : (k,) how far along it, to start from
         """
         on_edges = self._on_edges(segment, share, nodes)
-        brep, face, uv = self.tessellation.brep, on_edges.face, on_edges.uv
-        points = brep.points_at(face, uv)
-        _own(brep, points, face, uv, brep.edge_tolerance[self.tessellation.segment_edge[segment]] > _GAPE)
+        brep = self.tessellation.brep
+        off = brep.edge_tolerance[self.tessellation.segment_edge[segment]] > _OFF
+        points, face = _owned(brep, on_edges.faces, on_edges.uv, off)
         return Placed(points, on_edges.normals, face, on_edges.crease)
 
     def across(self, segment: Integers, face: Integers) -> Integers:
@@ -131,7 +132,7 @@ class Lines:
         ends = np.array(
             [(brep.edge_faces[e][0], brep.edge_faces[e][-1]) for e in edge.tolist()], dtype=np.int64
         ).reshape(-1, 2)
-        uvs = [self._uv(edge, face, t) for face in ends.T]
+        uvs = [self._border(edge, face, t, on_curve.reshape(-1, 3)) for face in ends.T]
         gapes = [
             np.linalg.norm(brep.points_at(f, uv) - on_curve.reshape(-1, 3), axis=1)
             for f, uv in zip(ends.T, uvs, strict=True)
@@ -140,11 +141,18 @@ class Lines:
         one, other = (brep.normals_at(face, uv) for face, uv in zip(ends.T, uvs, strict=True))
         both = unit(one + other)
         return _OnEdges(
-            face=np.where(second, ends[:, 1], ends[:, 0]),
-            uv=np.where(second[:, None], uvs[1], uvs[0]),
+            faces=np.where(second[:, None], ends[:, ::-1], ends),
+            uv=np.where(second[:, None, None], np.stack(uvs[::-1], axis=1), np.stack(uvs, axis=1)),
             normals=np.where(both.any(axis=1, keepdims=True), both, one),
             crease=(one * other).sum(axis=1) < np.cos(FEATURE_ANGLE),
         )
+
+    def _faces_around(self, vertex: int) -> tuple[Integers, Floats]:
+        """Return the numbers (k,) of the faces around a vertex, the lowest first, and its parameters (k, 2) there."""
+        mesh = self.tessellation
+        triangle, corner = np.nonzero(mesh.triangles == vertex)
+        faces, first = np.unique(mesh.face[triangle], return_index=True)
+        return faces, mesh.uv[triangle[first], corner[first]]
 
     @cached_property
     def _curves(self) -> dict[tuple[int, int], Any]:
@@ -183,6 +191,23 @@ class Lines:
         rows = zip(edge.tolist(), face.tolist(), t.tolist(), strict=True)
         return np.array([self._curve_on(e, f).Value(at).Coord() for e, f, at in rows]).reshape(-1, 2)
 
+    def _border(self, edge: Integers, face: Integers, t: Floats, points: Floats) -> Floats:
+        """Return the parameters (k, 2) of the points of the border of faces that are nearest to points of its edges.
+
+        By the book those are at the same parameter t of the edge, but not in every file.
+        """
+        from OCP.BRepAdaptor import BRepAdaptor_Curve
+
+        brep = self.tessellation.brep
+        uv = self._uv(edge, face, t)
+        apart = np.flatnonzero(np.linalg.norm(brep.points_at(face, uv) - points, axis=1) > _GAPE)
+        nearest = t.copy()
+        for k in apart.tolist():
+            border = BRepAdaptor_Curve(brep.edges[edge[k]], brep.faces[face[k] - 1])
+            nearest[k] = _closest_on_curve(border, float(t[k]), points[k])
+        uv[apart] = self._uv(edge[apart], face[apart], nearest[apart])
+        return uv
+
     def _curve_on(self, edge: int, face: int) -> Any:
         from OCP.BRepAdaptor import BRepAdaptor_Curve2d
 
@@ -192,10 +217,47 @@ class Lines:
         return self._curves[edge, face]
 
 
-def _own(brep: Brep, points: Floats, face: Integers, uv: Floats, doubtful: Booleans) -> None:
-    """Move the doubtful points of borders a hair into their faces, where needed."""
-    for k in np.flatnonzero(doubtful).tolist():
-        points[k] = brep.owned(int(face[k]), uv[k])
+def _owned(brep: Brep, faces: Integers, uv: Floats, off: Booleans) -> tuple[Floats, Integers]:
+    """Return places on the common border of faces, (n, 3) mm, and the numbers (n,) of the faces that own them.
+
+    Parameters
+    ----------
+    faces : (n, k) numbers, the one to prefer first
+    uv : (n, k, 2) parameters of the border on each
+    off : (n,) the edge or the vertex may be elsewhere than the borders
+    """
+    n, k = faces.shape
+    border = brep.points_at(faces.ravel(), uv.reshape(-1, 2)).reshape(n, k, 3)
+    points, face = border[:, 0].copy(), faces[:, 0].copy()
+    doubtful = np.flatnonzero(off | (np.linalg.norm(border - border[:, :1], axis=2).max(axis=1) > _GAPE))
+    met_uv = meeting(brep, border[doubtful].mean(axis=1), faces[doubtful], uv[doubtful])
+    for row, met in zip(doubtful.tolist(), met_uv, strict=True):
+        points[row], face[row] = _between(brep, faces[row], border[row], uv[row], met)
+    return points, face
+
+
+def _between(brep: Brep, faces: Integers, border: Floats, border_uv: Floats, met_uv: Floats) -> tuple[Floats, int]:
+    """Return the place (3,) between faces that gape that is nearest to those that do not own it, and its owner.
+
+    Parameters
+    ----------
+    faces : (k,) numbers, the one to prefer first
+    border : (k, 3) mm, the common border on each
+    border_uv, met_uv : (k, 2) parameters on each of the border and of the place where the surfaces meet
+    """
+    best, place, owner = np.inf, border[0], int(faces[0])
+    for uv in (met_uv, border_uv):
+        for which, number in enumerate(faces.tolist()):
+            at = brep.held(number, uv[which])
+            if at is None:
+                continue
+            feet, feet_uv = brep.project(np.tile(at, (len(faces), 1)), faces, uv)
+            to_border = np.linalg.norm(border - at, axis=1)
+            off = np.where(brep.inside(faces, feet_uv), np.linalg.norm(feet - at, axis=1), to_border)
+            off[which] = 0.0
+            if off.max() < best - _GAPE:
+                best, place, owner = off.max(), at, number
+    return place, owner
 
 
 def _closest_on_curve(curve: Any, start: float, point: Floats) -> float:

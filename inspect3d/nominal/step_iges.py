@@ -14,6 +14,7 @@ from inspect3d.outcome import InputError
 
 STEP_SUFFIXES = frozenset({".step", ".stp"})
 IGES_SUFFIXES = frozenset({".iges", ".igs"})
+_GEOMETRY = ("StepGeom_", "StepShape_")
 
 
 def read_brep(path: Path) -> Brep:
@@ -55,12 +56,15 @@ def brep_of(shape: Any, faces: list[Any]) -> Brep:
     for face in faces:
         numbers.Add(face)
     edges = [TopoDS.Edge_s(edge) for edge in _mapped(shape, "edge")]
+    tolerances = np.array([BRep_Tool.Tolerance_s(edge) for edge in edges])
+    if not np.isfinite(tolerances).all():
+        raise InputError("An edge of the model lies infinitely far from its faces; export it again.")
     return Brep(
         shape=shape,
         faces=tuple(TopoDS.Face_s(face) for face in faces),
         edges=tuple(edges),
         edge_faces=tuple(tuple(sorted(map(numbers.FindIndex, beside.FindFromKey(edge)))) for edge in edges),
-        edge_tolerance=np.array([BRep_Tool.Tolerance_s(edge) for edge in edges]),
+        edge_tolerance=tolerances,
     )
 
 
@@ -109,8 +113,20 @@ def _transferred(path: Path, is_step: bool) -> Any:
     reader: Any = STEPControl_Reader() if is_step else IGESControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise InputError(f"{path.name} cannot be read as {'STEP' if is_step else 'IGES'}; export it again.")
+    if is_step:
+        _require_sound(path, reader.StepModel())
     reader.TransferRoots()
     return reader.OneShape()
+
+
+def _require_sound(path: Path, model: Any) -> None:
+    """Refuse geometry of a wrong type, on which OpenCASCADE crashes; what is wrong with colours does not matter."""
+    for number in range(1, model.NbEntities() + 1):
+        check = model.Check(number, True)
+        kind = model.Value(number).DynamicType().Name()
+        if check.HasFailed() and kind.startswith(_GEOMETRY):
+            kind, what = kind.partition("_")[2], check.CFail(1)
+            raise InputError(f"{path.name} is damaged: it holds a wrong {kind} ({what}); export it again.")
 
 
 def silence() -> None:
