@@ -249,16 +249,22 @@ def _deal(
 ) -> None:
     """Deal a facet's block out to the arrays of all facets and all cameras; see `accumulate`."""
     node, node_right, cross, camera, camera_right, whole, statistics = out
-    node[f], node_right[f] = block[:3, :3], right[:3]
-    cross[f] = 0.0
     factor = weight * statistics[f, 3] ** power
+    for i in range(3):
+        node_right[f, i] = right[i]
+        for j in range(3):
+            node[f, i, j] = block[i, j]
+        for j in range(cross.shape[2]):
+            cross[f, i, j] = 0.0
     for m in range(views):
-        at = seen[m] * c
-        cross[f, :, at : at + c] = block[:3, 3 + m * c : 3 + (m + 1) * c]
-        camera_right[chunk, at : at + c] += weight * right[3 + m * c : 3 + (m + 1) * c]
-        for other in range(views):
-            to = seen[other] * c
-            part = block[3 + m * c : 3 + (m + 1) * c, 3 + other * c : 3 + (other + 1) * c]
-            camera[chunk, at : at + c, to : to + c] += factor * part
-            if len(whole):
-                whole[f, at : at + c, to : to + c] = part
+        for i in range(c):
+            own, at = 3 + m * c + i, seen[m] * c + i
+            camera_right[chunk, at] += weight * right[own]
+            for j in range(3):
+                cross[f, j, at] = block[j, own]
+            for other in range(views):
+                for j in range(c):
+                    part, to = block[own, 3 + other * c + j], seen[other] * c + j
+                    camera[chunk, at, to] += factor * part
+                    if len(whole):
+                        whole[f, at, to] = part
