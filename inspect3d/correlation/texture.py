@@ -11,7 +11,7 @@ BROAD = 20.0  # px, standard deviation of what counts as light and not as speckl
 
 
 def speckle_size(grey: Floats, places: Floats) -> float:
-    """Return the width of the speckle's dots, px: that of the autocorrelation's peak at half its height.
+    """Return the width of the speckle's dots, px: that of the autocorrelation's peak at half its height; 0 without any.
 
     Parameters
     ----------
@@ -25,6 +25,8 @@ def speckle_size(grey: Floats, places: Floats) -> float:
     part = np.ascontiguousarray(grey[top : top + WINDOW, left : left + WINDOW], dtype=np.float64)
     part = part - cv2.GaussianBlur(part, (0, 0), BROAD)
     part -= part.mean()
+    if not part.any():
+        return 0.0
     padded = (2 * part.shape[0], 2 * part.shape[1])
     power = np.abs(np.fft.rfft2(part, padded)) ** 2
     correlation = np.fft.irfft2(power, padded)
