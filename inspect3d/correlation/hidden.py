@@ -24,7 +24,8 @@ class HiddenMotion:
     Parameters
     ----------
     words : what it is
-    pattern : (n,) the change of the deviation at the nodes of the scene, of rms 1; zero if the shape stays as it is
+    pattern : (n,) the change of the deviation at the nodes of the scene, of rms 1 over those that are seen well; zero
+        if the shape stays as it is
     sigma : mm, standard uncertainty of its size in the map; infinite if the pictures do not show it at all
     prior : share of what is known about it that comes from the priors, 0 to 1
     """
@@ -48,26 +49,30 @@ def hidden_motions(scene: Scene, system: System, freedom: Freedom, local: float)
     That the part may move as a whole is left to the alignment and not repeated here.
     """
     found: list[HiddenMotion] = []
-    n = len(scene.nodes)
+    whole = scene.whole
+    if not whole.any():
+        return ()
     if freedom.poses == "free":
         growth = ((scene.nodes - scene.centre) * scene.normals).sum(axis=1)
-        size = np.sqrt((growth**2).mean())
+        size = np.sqrt((growth[whole] ** 2).mean())
         words = "growth of the whole part: the scale is not known"
         found.append(HiddenMotion(words, growth / size if size > 0 else growth, np.inf, 0.0))
     found += _unseen(scene, system, freedom)
     factor = system.camera_factor
     if not factor.size:
         return tuple(found)
-    patterns, sizes, mixes = np.linalg.svd(system.following @ factor, full_matrices=False)
+    response = system.following @ factor
+    _, sizes, mixes = np.linalg.svd(response[whole], full_matrices=False)
+    sizes = sizes / np.sqrt(np.count_nonzero(whole))
     _, sigmas = freedom.spread(freedom.columns)
     scale = np.sqrt(np.diag(factor @ factor.T))
-    for pattern, size, mix in zip(patterns.T, sizes / np.sqrt(n), mixes, strict=True):
+    for size, mix in zip(sizes, mixes, strict=True):
         if size > LOUD * local:
             cameras = factor @ mix
             prior = float(((cameras / sigmas) ** 2).sum())
             words = _words(cameras / np.where(scale > 0, scale, 1.0), freedom)
             words = f"{words}: {1000 * size:.2g} µm rms of the map, {100 * prior:.0f} % of what is known from the prior"
-            found.append(HiddenMotion(words, pattern * np.sqrt(n), float(size), prior))
+            found.append(HiddenMotion(words, response @ mix / size, float(size), prior))
     return tuple(found)
 
 
@@ -98,6 +103,8 @@ def _words(cameras: Floats, freedom: Freedom) -> str:
     """Return the chief unknowns of a motion of the cameras, given in their standard uncertainties."""
     lens = [k for k, name in enumerate(freedom.names) if not name.startswith(("turn", "shift"))]
     chief = [freedom.names[k] for k in lens if abs(cameras[k]) > CHIEF]
+    if not chief and freedom.poses == "common" and not freedom.stands:
+        return "the place of the part before the cameras"
     if not chief:
         return "the poses of the cameras against each other"
     return "the " + ", the ".join(chief) + ", with the poses"

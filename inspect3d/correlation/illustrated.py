@@ -44,8 +44,8 @@ def illustrated(
     figures: list[Figure] = []
     for k, (view, (picture, scale)) in enumerate(zip(shape.views, small, strict=True)):
         marks = np.zeros((0, 2)) if picks is None else picks.pixels[:, k]
-        words = f"The CAD model over picture {k + 1}, as the cameras were found"
-        words += "; crosses are the landmarks as picked" if picks else ""
+        words = f"The CAD model over picture {k + 1}"
+        words += "; crosses: landmarks as picked" if picks else ""
         figures.append(Photograph(f"picture_{k + 1}", words, picture, scale, outline(nominal, view), marks))
     stages = [("start", "at the start", tuple(start), False)]
     if shape.calibrated is not None:

@@ -18,6 +18,7 @@ from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
 
 FEWEST = 6
+WHOLE = 0.5
 SAMPLE = 200
 
 
@@ -54,6 +55,11 @@ class Scene:
     def sample(self) -> Floats:
         """Return some hundred of the nodes, all over the part, (k, 3) mm."""
         return self.nodes[:: 1 + len(self.nodes) // SAMPLE]
+
+    @property
+    def whole(self) -> Booleans:
+        """Tell around which nodes at least half of the evaluation points count, (n,)."""
+        return self.share >= WHOLE
 
     @cached_property
     def extent(self) -> float:

@@ -18,8 +18,6 @@ from inspect3d.deviate.deviation import Deviation
 from inspect3d.nominal.nominal import InspectionMesh
 from inspect3d.register.gauge import Gauge, best_fit
 
-WHOLE = 0.5
-
 
 @dataclass(frozen=True, eq=False)
 class Shape:
@@ -67,7 +65,7 @@ class Shape:
 
         Those with at least half their evaluation points in facets on which the pictures agree, and off creases.
         """
-        return (self.scene.share >= WHOLE) & ~self.mesh.crease[self.scene.node]
+        return self.scene.whole & ~self.mesh.crease[self.scene.node]
 
     @property
     def observed(self) -> Booleans:
