@@ -20,6 +20,7 @@ from inspect3d.correlation.shape import Shape
 from inspect3d.correlation.solver import COARSE, ON_NOMINAL, Level, Solver, State, Step, held
 from inspect3d.correlation.texture import speckle_size
 from inspect3d.correlation.uncertainty import Systematic, needed_columns, uncertainty
+from inspect3d.correlation.visibility import OUTLINE
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
 
@@ -36,6 +37,8 @@ deviations for errors of their own would run far off their priors.
 NOISY = 25.0
 STEEPEST_TILT = 0.2
 ENOUGH = 0.3
+MARGINS = (OUTLINE, OUTLINE + 4, OUTLINE + 8)  # px
+FRAYED, FEW = 3.0, 0.01
 ROUNDS = 3
 
 
@@ -102,12 +105,14 @@ class Correlate:
         state = Solver(calibrating, COARSE)(seen, pictures, views, freedom, told=told)
         calibrated = state.views if calibrating else None
         state = Solver(coarse[len(calibrating) :])(seen, pictures, state.views, freedom, told=told)
-        if freedom.unknowns:  # the cameras have moved, and with them the outline of the part in the pictures
+        last = freedom if levels[-1].moves == "both" else held(freedom)
+        for margin in MARGINS if freedom.unknowns else ():  # the outline of the part has moved with the cameras
             deviation = np.zeros(len(nominal.mesh))
             deviation[seen.node] = state.deviation
-            seen = self._scene(nominal, state.views, masks)
+            seen = self._scene(nominal, state.views, masks, margin)
             state = Solver(levels[-1:])(seen, pictures, state.views, freedom, deviation[seen.node], told)
-        last = freedom if levels[-1].moves == "both" else held(freedom)
+            if not _frayed(seen, self._found(seen, pictures, state, last)):
+                break
         found = self._found(seen, pictures, state, last)
         for _ in range(ROUNDS):
             good = self._good(found) & (seen.tilt(state.deviation) <= STEEPEST_TILT)
@@ -126,9 +131,16 @@ class Correlate:
         motions = hidden_motions(seen, sure.system, last, local)
         return Shape(nominal.mesh, seen, state, sure, motions, found, calibrated, systematic)
 
-    def _scene(self, nominal: Nominal, views: Sequence[View], masks: Sequence[Booleans | None] | None) -> Scene:
+    def _scene(
+        self,
+        nominal: Nominal,
+        views: Sequence[View],
+        masks: Sequence[Booleans | None] | None,
+        margin: float = OUTLINE,
+    ) -> Scene:
         masks = masks or [None] * len(views)
-        return scene(nominal, views, self.pixels, np.radians(self.steepest), masks, self.per_edge, self.lifted)
+        steepest = np.radians(self.steepest)
+        return scene(nominal, views, self.pixels, steepest, masks, self.per_edge, self.lifted, margin)
 
     def _found(self, seen: Scene, pictures: Pictures, state: State, freedom: Freedom) -> Facets:
         """Return what the pictures say about the facets in the end, as `uncertainty` needs it."""
@@ -139,6 +151,16 @@ class Correlate:
         """Tell which facets agree between the pictures, (f,)."""
         median = np.median(found.noise)
         return (found.correlation >= self.poorest) & (found.noise <= NOISY * median)
+
+
+def _frayed(seen: Scene, found: Facets) -> bool:
+    """Tell whether the background shines in at the edge of what is seen.
+
+    What only priors tell about the cameras lets the pictures agree and slip over the part together: its outline is then
+    not where they say.
+    """
+    rim = seen.rim & (found.freedom > 0)
+    return bool(np.mean(found.noise[rim] > FRAYED * np.median(found.noise)) > FEW)
 
 
 def _require_coarse(seen: Scene, pictures: Pictures, views: Sequence[View]) -> None:

@@ -13,7 +13,7 @@ from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.camera import View
 from inspect3d.correlation.evaluation import EvaluationPoints, evaluation_points, points_per_edge
 from inspect3d.correlation.factor import Ordering
-from inspect3d.correlation.visibility import visibility
+from inspect3d.correlation.visibility import OUTLINE, visibility
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
 
@@ -75,6 +75,15 @@ class Scene:
         pairs = pairs + pairs.T
         pairs.data[:] = 1.0
         return pairs
+
+    @cached_property
+    def rim(self) -> Booleans:
+        """Tell which facets touch the edge of what is seen, (f,)."""
+        ends = np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
+        edges, counts = np.unique(np.sort(ends), axis=0, return_counts=True)
+        outer = np.zeros(len(self.nodes), dtype=bool)
+        outer[edges[counts == 1]] = True
+        return np.asarray(outer[self.triangles].any(axis=1))
 
     @cached_property
     def ordering(self) -> Ordering:
@@ -197,6 +206,7 @@ def scene(
     masks: Sequence[Booleans | None],
     per_edge: int | None = None,
     lifted: bool = True,
+    margin: float = OUTLINE,
 ) -> Scene:
     """Return what the views see of a part.
 
@@ -207,6 +217,7 @@ def scene(
     masks : of each view, True where its picture may be used, or None
     per_edge : evaluation points along the edge of every facet, in place of `pixels`
     lifted : points on the nominal surface; else on the flat facets
+    margin : px, by which points must lie within the outline of the part in the pictures
 
     Raises
     ------
@@ -216,7 +227,7 @@ def scene(
     mesh = nominal.mesh
     count = points_per_edge(mesh, views, pixels) if per_edge is None else np.full(len(mesh.triangles), per_edge)
     points = evaluation_points(nominal, count, lifted)
-    see = visibility(nominal, points, views, steepest, masks)
+    see = visibility(nominal, points, views, steepest, masks, margin)
     facet = points.facet
     counts = np.bincount(facet[see.used], minlength=len(mesh.triangles))
     kept = np.flatnonzero(counts >= FEWEST)

@@ -22,6 +22,7 @@ from inspect3d.outcome import MeasurementError
 from inspect3d.register.mobility import spread
 
 SHORTER, LONGER, LEAST, PATIENCE = 0.5, 1.2, 0.02, 4
+WORSE = 1.02  # times the variance of the residuals before it: a step that leads to more went too far
 COARSE = 5e-4
 RUNAWAY = 0.3  # of the extent of what is seen: a step that large leads nowhere
 VAGUE = 1e-6  # share of the stiffest motion's stiffness; softer ones are held while the shape is
@@ -146,6 +147,7 @@ class Solver:
         tolerance = self.tolerance if final else max(self.tolerance, COARSE * max(1.0, level.blur))
         last, factor = np.zeros(len(scene.nodes)), 1.0
         nodal: Factor | None = None
+        before: _Stride | None = None
         for count in range(level.steps):
             found = facets(scene, stack, state.views, state.deviation, state.weights, freedom.columns, points=points)
             if not np.isfinite(found.noise).any():
@@ -154,6 +156,10 @@ class Solver:
                     "part, exposed right, and that the cameras stand where they are said to."
                 )
             noise = noise_of(found, state.weights, len(scene.nodes))
+            if before is not None and noise > WORSE * before.noise and factor > LEAST:
+                factor = max(factor * SHORTER, LEAST)
+                state = replace(before(freedom, factor), weights=before.state.weights)
+                continue
             if freedom.unknowns or level.moves in ON_NOMINAL:
                 shape, cameras = _step(scene, found, noise, state, freedom, level)
             else:
@@ -172,17 +178,31 @@ class Solver:
                 )
             step = Step(level, change, float(np.sqrt(noise)))
             told(step)
-            state = State(
-                state.deviation + factor * shape,
-                freedom.moved(state.views, factor * cameras),
-                robust(found) if count < PATIENCE else state.weights,
-                (*state.steps, step),
-                change < tolerance,
+            weights = robust(found) if count < PATIENCE else state.weights
+            stride = _Stride(state, shape, cameras, noise)
+            state = replace(
+                stride(freedom, factor), weights=weights, steps=(*state.steps, step), settled=change < tolerance
             )
             if state.settled:
                 break
             last = shape
+            before = stride if freedom.unknowns and level.moves == "both" else None
         return state
+
+
+@dataclass(frozen=True, eq=False)
+class _Stride:
+    """A step from a state, and the variance of the residuals there."""
+
+    state: State
+    shape: Floats
+    cameras: Floats
+    noise: float
+
+    def __call__(self, freedom: Freedom, factor: float) -> State:
+        """Return the state after a share of the step."""
+        deviation = self.state.deviation + factor * self.shape
+        return replace(self.state, deviation=deviation, views=freedom.moved(self.state.views, factor * self.cameras))
 
 
 def held(freedom: Freedom, poses: bool = True) -> Freedom:

@@ -36,11 +36,16 @@ class Visibility:
 
 
 def visibility(
-    nominal: Nominal, points: EvaluationPoints, views: Sequence[View], steepest: float, masks: Sequence[Booleans | None]
+    nominal: Nominal,
+    points: EvaluationPoints,
+    views: Sequence[View],
+    steepest: float,
+    masks: Sequence[Booleans | None],
+    margin: float = OUTLINE,
 ) -> Visibility:
     """Return which points are seen by rays from the cameras to the nominal surface.
 
-    A camera sees a point that lies in its picture (three pixels within the border), four pixels or more within the
+    A camera sees a point that lies in its picture (three pixels within the border), `margin` px or more within the
     outline of the part, where a blurred picture mixes it with what is behind, and in the mask; whose normal leans at
     most `steepest` rad towards the line of sight, and that no other part of the nominal surface hides. A view takes
     part in a facet of which it sees at least half the points.
@@ -57,7 +62,7 @@ def visibility(
     lifted = points.places + (LIFT * nominal.diagonal + 2 * points.chord) * normals
     seen = np.empty((len(views), len(points)), dtype=np.bool_)
     for row, view, mask in zip(seen, views, masks, strict=True):
-        _write_seen(nominal, points.places, normals, lifted, view, steepest, mask, row)
+        _write_seen(nominal, points.places, normals, lifted, view, steepest, mask, margin, row)
     taking, used = np.empty((len(mesh.triangles), len(views)), dtype=np.bool_), np.empty(len(points), dtype=np.bool_)
     write_used(points.starts, seen, SHARE, taking, used)
     return Visibility(seen, taking, used)
@@ -71,13 +76,14 @@ def _write_seen(
     view: View,
     steepest: float,
     mask: Booleans | None,
+    margin: float,
     seen: Booleans,
 ) -> None:
     from inspect3d.correlation.point_kernel import write_in_sight
 
     camera, pose = view.camera, view.camera_from_cad
     rig = (camera.matrix, camera.distortion, pose.rotation, pose.translation)
-    allowed = _within_outline(nominal.mesh, view)
+    allowed = _within_outline(nominal.mesh, view, margin)
     if mask is not None:
         allowed = allowed & mask
     write_in_sight(places, normals, rig, view.centre, np.cos(steepest), MARGIN, allowed, seen)
@@ -85,7 +91,7 @@ def _write_seen(
     seen[near] = ~nominal.surface.hides(lifted[near], view.centre)
 
 
-def _within_outline(mesh: InspectionMesh, view: View) -> Booleans:
+def _within_outline(mesh: InspectionMesh, view: View, margin: float) -> Booleans:
     """Return the pixels (rows, columns) that lie well inside the picture of the facets that face the camera."""
     import cv2
 
@@ -100,4 +106,4 @@ def _within_outline(mesh: InspectionMesh, view: View) -> Booleans:
     for triangle in np.rint(pixels * 2**FINE).astype(np.int32):
         cv2.fillConvexPoly(filled, triangle, 1, shift=FINE)
     framed = cv2.copyMakeBorder(filled, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
-    return np.asarray(cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1] > OUTLINE)
+    return np.asarray(cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1] > margin)

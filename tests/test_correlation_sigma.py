@@ -1,0 +1,107 @@
+"""The uncertainty that stereocorrelation states is the scatter of its errors: the short form of the benchmark."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from inspect3d.camera import View
+from inspect3d.correlation.correlate import Correlate
+from inspect3d.correlation.freedom import Freedom, Lens
+from inspect3d.correlation.linear import gauge_of
+from inspect3d.pose import Pose
+from tests.sheets import sheet
+from tests.speckled import Speckle, photographed, picture, rig
+
+SEEDS = 6
+LENS = Lens(focal=48.0, centre=4.0)
+
+
+def bump(x, y):
+    """Return a deviation in the middle of the sheet, mm."""
+    return 0.03 * np.exp(-((x - 25) ** 2 + (y - 20) ** 2) / 2 / 8**2)
+
+
+@pytest.fixture(scope="module")
+def nominal():
+    """Return the wavy sheet with elements of 3 mm."""
+    return sheet(edge=3.0)
+
+
+@pytest.fixture(scope="module")
+def exact():
+    """Return two cameras and what they would see without noise."""
+    views, speckle = rig(), Speckle.drawn(np.random.default_rng(0), 0.7)
+    return views, [picture(view, speckle, bump) for view in views]
+
+
+def photographs(exact, random):
+    """Return pictures of 1 % noise and different gain and offset."""
+    return [photographed(random, e, 2.4, random.uniform(0.8, 1.05), random.uniform(0, 8)) for e in exact[1]]
+
+
+def believed(view, random):
+    """Return a view whose lens is drawn from what is known of it, and the pose that makes up for it best."""
+    matrix = view.camera.matrix.copy()
+    focal, centre = random.normal(0, LENS.focal), random.normal(0, LENS.centre, 2)
+    away = view.depth(np.array([[30.0, 22.5, 0.0]]))[0]
+    shift = np.array([*(-centre / matrix[0, 0] * away), focal / matrix[0, 0] * away])
+    matrix[[0, 1], [0, 1]] += focal
+    matrix[:2, 2] += centre
+    pose = Pose(np.eye(3), shift) @ view.camera_from_cad
+    return View(replace(view.camera, matrix=matrix), pose)
+
+
+def without(shape, error, modes):
+    """Return an error and its sigma once modes are out of both, (2, n)."""
+    inverse = np.zeros(modes.T.shape)
+    inverse[:, shape.sound] = np.linalg.pinv(modes[shape.sound])
+    sigma = np.sqrt(shape.uncertainty.variances_without(modes, inverse))
+    return np.stack([error - modes @ (inverse @ error), sigma])[:, shape.sound]
+
+
+def rms(values):
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def test_with_known_cameras_scatter_over_the_seeds_is_what_was_claimed(nominal, exact):
+    ratios, sound = [], True
+    for seed in range(SEEDS):
+        shape = Correlate(pixels=4.0)(nominal, photographs(exact, np.random.default_rng(seed)), exact[0])
+        error = shape.values - bump(*shape.scene.nodes[:, :2].T)
+        ratios.append(error / np.sqrt(shape.uncertainty.variances))
+        sound = sound & shape.sound
+    assert sound.mean() > 0.97
+    z = np.array(ratios)[:, sound]
+    assert 0.9 < rms(z) < 1.1
+    assert 0.93 < (np.abs(z) < 1.96).mean() < 0.97
+    low, high = np.percentile(np.sqrt((z**2).mean(axis=0)), [5, 95])
+    spread = np.sqrt(chi2.ppf([0.05, 0.95], SEEDS) / SEEDS)
+    assert low == pytest.approx(spread[0], abs=0.15)
+    assert high == pytest.approx(spread[1], abs=0.15)
+
+
+def test_self_calibrated_the_rest_and_the_weak_motions_are_as_large_as_claimed(nominal, exact):
+    z, distance, modes = [], 0.0, 0
+    for seed in range(SEEDS):
+        random = np.random.default_rng(100 + seed)
+        views = tuple(believed(view, random) for view in exact[0])
+        free = Freedom("free", (LENS,) * 2, views, nominal.mesh.nodes.mean(axis=0))
+        shape = Correlate(pixels=4.0)(nominal, photographs(exact, random), views, free)
+        error = shape.values - bump(*shape.scene.nodes[:, :2].T)
+        gauge = gauge_of(shape.scene, free)
+        weak = np.stack([motion.pattern for motion in shape.hidden if np.isfinite(motion.sigma)], axis=1)
+        rest, sigma = without(shape, error, np.column_stack([gauge, weak]))
+        z.append(rest / sigma)
+        fields = weak / len(weak)
+        sizes = fields.T @ (error - gauge @ (gauge.T @ error))
+        distance += sizes @ np.linalg.solve(fields.T @ shape.uncertainty.covariance(fields), sizes)
+        modes += weak.shape[1]
+    together = np.concatenate(z)
+    assert 0.9 < rms(together) < 1.1
+    assert 0.93 < (np.abs(together) < 1.96).mean() < 0.97
+    assert chi2.ppf(0.001, modes) < distance < chi2.ppf(0.99, modes)
