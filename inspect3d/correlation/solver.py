@@ -24,6 +24,7 @@ from inspect3d.register.mobility import spread
 SHORTER, LONGER, LEAST, PATIENCE = 0.5, 1.2, 0.02, 4
 WORSE = 1.02  # times the variance of the residuals before it: a step that leads to more went too far
 COARSE = 5e-4
+SETTLED = 0.005  # share of what the cameras leave open about the shape: a shorter step changes nothing of note
 RUNAWAY = 0.3  # of the extent of what is seen: a step that large leads nowhere
 VAGUE = 1e-6  # share of the stiffest motion's stiffness; softer ones are held while the shape is
 Moves = Literal["poses", "cameras", "shape", "both"]
@@ -92,8 +93,8 @@ class Solver:
     Parameters
     ----------
     levels : in their order
-    tolerance : mm; the last level ends when no node moves farther in a step, the others at half a micrometre,
-        times the pixels of the blur
+    tolerance : mm; the last level ends when no node moves farther in a step, or by more than half a per cent of the
+        uncertainty that unknown cameras give the shape; the others at half a micrometre, times the pixels of the blur
 
     After four steps of a level, one that turns back is halved, and so are the next until they go on: where the
     pictures show a motion weakly, a full step goes too far and the next comes back. The robust weights of the facets
@@ -160,8 +161,9 @@ class Solver:
                 factor = max(factor * SHORTER, LEAST)
                 state = replace(before(freedom, factor), weights=before.state.weights)
                 continue
+            sure = 0.0
             if freedom.unknowns or level.moves in ON_NOMINAL:
-                shape, cameras = _step(scene, found, noise, state, freedom, level)
+                shape, cameras, sure = _step(scene, found, noise, state, freedom, level)
             else:
                 cameras = np.zeros(0)
                 shape, nodal = _step_of_shape(scene, found, noise, state, level, nodal)
@@ -181,7 +183,10 @@ class Solver:
             weights = robust(found) if count < PATIENCE else state.weights
             stride = _Stride(state, shape, cameras, noise)
             state = replace(
-                stride(freedom, factor), weights=weights, steps=(*state.steps, step), settled=change < tolerance
+                stride(freedom, factor),
+                weights=weights,
+                steps=(*state.steps, step),
+                settled=change < max(tolerance, SETTLED * sure),
             )
             if state.settled:
                 break
@@ -213,7 +218,8 @@ def held(freedom: Freedom, poses: bool = True) -> Freedom:
 
 def _step(
     scene: Scene, found: Facets, noise: float, state: State, freedom: Freedom, level: Level
-) -> tuple[Floats, Floats]:
+) -> tuple[Floats, Floats, float]:
+    """Return the step of shape and cameras, and the rms uncertainty (mm) that the cameras give the shape."""
     mixing, sigmas = freedom.spread(freedom.columns)
     scale, slides = freedom.scale(state.views, scene.sample), slides_of(scene, freedom, state.views)
     camera_right = mixing.T @ found.camera_right / noise - freedom.offset(state.views) / sigmas**2
@@ -221,10 +227,12 @@ def _step(
         matrix = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)
         firm = np.linalg.svd(slides / scale[:, None])[0][:, slides.shape[1] :] * scale[:, None]
         inverse = firm @ np.linalg.pinv(firm.T @ matrix @ firm, VAGUE, hermitian=True) @ firm.T
-        return np.zeros(len(scene.nodes)), inverse @ camera_right
+        return np.zeros(len(scene.nodes)), inverse @ camera_right, 0.0
     factors = state.weights * found.clean
     system = system_of(scene, found, factors, noise, freedom, freedom.columns, scale, slides, level.stiffness)
-    return system.solve(_nodal_equations(scene, found, noise, state, level)[1], camera_right)
+    shape, cameras = system.solve(_nodal_equations(scene, found, noise, state, level)[1], camera_right)
+    by_cameras = (system.following @ system.camera_factor)[scene.whole]
+    return shape, cameras, float(np.sqrt((by_cameras**2).sum() / max(len(by_cameras), 1)))
 
 
 def _step_of_shape(

@@ -1,0 +1,72 @@
+"""What the report says about a shape that was found by correlation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from inspect3d.correlation.freedom import Freedom
+from inspect3d.correlation.shape import Shape
+
+LOUD = 0.1  # px, disagreement of the pictures that the reader must hear of
+PULLED = 5.0  # standard uncertainties by which a camera may differ from what was known without a word
+
+
+def contributions(shape: Shape) -> tuple[tuple[str, str, str], ...]:
+    """Return what the uncertainty of a shape is made of: source, size with its unit, and how it enters."""
+    sure, systematic = shape.uncertainty, shape.systematic
+    found = [
+        (
+            "noise of the pictures",
+            f"{np.sqrt(sure.noise):.2g} grey levels",
+            f"by what the fit leaves over, propagated to every node; times {sure.correlated:.2f} for being correlated",
+        )
+    ]
+    if systematic is not None:
+        words = f"a smooth shift of each picture that no camera model explains, alike over {systematic.length:.3g} mm"
+        found.append(("systematic shift of the pictures", f"{systematic.size:.2g} px", words))
+    weak = [motion for motion in shape.hidden if np.isfinite(motion.sigma)]
+    if weak:
+        size = 1000 * float(np.sqrt(sum(motion.sigma**2 for motion in weak)))
+        words = "motions that the pictures tell weakly, which the priors of the cameras bound; named below"
+        found.append(("cameras", f"{size:.2g} µm rms over the map", words))
+    return tuple(found)
+
+
+def _pulled(shape: Shape, freedom: Freedom) -> tuple[str, ...]:
+    """Return by how much the pictures contradict what was known of the cameras, where that is a lot."""
+    _, sigmas = freedom.spread(freedom.columns)
+    pulls = np.abs(freedom.offset(shape.views)) / sigmas
+    if not len(pulls) or pulls.max() < PULLED:
+        return ()
+    return (
+        f"The pictures move the {freedom.names[int(np.argmax(pulls))]} by {pulls.max():.0f} standard uncertainties "
+        "from what was known of it: the cameras are known less well than is stated.",
+    )
+
+
+def remarks(shape: Shape, freedom: Freedom) -> tuple[str, ...]:
+    """Return what the reader must know about a shape, a sentence each.
+
+    Parameters
+    ----------
+    freedom : what was not known about the cameras
+    """
+    remarks = []
+    if shape.systematic is not None and shape.systematic.size > LOUD:
+        remarks.append(
+            f"Across the epipolar lines, where no shape can make up for it, the pictures disagree by "
+            f"{shape.systematic.size:.2g} px: the calibration is not as good as it is said to be. State its "
+            "uncertainty (`sigma`), or calibrate again."
+        )
+    if not shape.settled:
+        remarks.append(
+            f"The solver stopped after {len(shape.state.steps)} steps of its last stage, before the shape had settled: "
+            f"the last step moved it by up to {1000 * shape.state.steps[-1].change:.2g} µm."
+        )
+    left_out = np.count_nonzero(~shape.sound)
+    if left_out:
+        remarks.append(
+            f"{left_out} of the {len(shape.sound)} nodes that two cameras see are not observed: the pictures agree on "
+            "too few of the points around them, or they lie on an edge."
+        )
+    return (*remarks, *_pulled(shape, freedom))
