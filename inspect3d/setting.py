@@ -47,7 +47,9 @@ def settings_of(plugin: type) -> tuple[Setting, ...]:
 def _kind(hint: Any) -> str:
     if get_origin(hint) is Literal:
         return " | ".join(map(repr, get_args(hint)))
-    return hint.__name__ if isinstance(hint, type) and not get_args(hint) else str(hint)
+    if isinstance(hint, type) and not get_args(hint):
+        return hint.__name__
+    return re.sub(r"(?:\w+\.)+(\w+)", r"\1", str(hint))
 
 
 def _default(field: Any) -> str:
