@@ -20,7 +20,6 @@ from inspect3d.correlation.shape import Shape
 from inspect3d.correlation.solver import COARSE, ON_NOMINAL, Level, Solver, State, Step, held
 from inspect3d.correlation.texture import speckle_size
 from inspect3d.correlation.uncertainty import Systematic, needed_columns, uncertainty
-from inspect3d.correlation.visibility import OUTLINE
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
 
@@ -37,9 +36,8 @@ deviations for errors of their own would run far off their priors.
 NOISY = 25.0
 STEEPEST_TILT = 0.2
 ENOUGH = 0.3
-MARGINS = (OUTLINE, OUTLINE + 4, OUTLINE + 8)  # px
-FRAYED, FEW = 3.0, 0.01
-ROUNDS = 3
+FRAYED, CLEAR = 3.0, 0.999
+ROUNDS = 5
 
 
 @dataclass(frozen=True)
@@ -106,16 +104,14 @@ class Correlate:
         calibrated = state.views if calibrating else None
         state = Solver(coarse[len(calibrating) :])(seen, pictures, state.views, freedom, told=told)
         last = freedom if levels[-1].moves == "both" else held(freedom)
-        for margin in MARGINS if freedom.unknowns else ():  # the outline of the part has moved with the cameras
+        if freedom.unknowns:  # the cameras have moved, and with them the outline of the part in the pictures
             deviation = np.zeros(len(nominal.mesh))
             deviation[seen.node] = state.deviation
-            seen = self._scene(nominal, state.views, masks, margin)
+            seen = self._scene(nominal, state.views, masks)
             state = Solver(levels[-1:])(seen, pictures, state.views, freedom, deviation[seen.node], told)
-            if not _frayed(seen, self._found(seen, pictures, state, last)):
-                break
         found = self._found(seen, pictures, state, last)
         for _ in range(ROUNDS):
-            good = self._good(found) & (seen.tilt(state.deviation) <= STEEPEST_TILT)
+            good = self._good(seen, found) & (seen.tilt(state.deviation) <= STEEPEST_TILT)
             if good.all():
                 break
             _require_some(good, found)
@@ -131,36 +127,24 @@ class Correlate:
         motions = hidden_motions(seen, sure.system, last, local)
         return Shape(nominal.mesh, seen, state, sure, motions, found, calibrated, systematic)
 
-    def _scene(
-        self,
-        nominal: Nominal,
-        views: Sequence[View],
-        masks: Sequence[Booleans | None] | None,
-        margin: float = OUTLINE,
-    ) -> Scene:
+    def _scene(self, nominal: Nominal, views: Sequence[View], masks: Sequence[Booleans | None] | None) -> Scene:
         masks = masks or [None] * len(views)
-        steepest = np.radians(self.steepest)
-        return scene(nominal, views, self.pixels, steepest, masks, self.per_edge, self.lifted, margin)
+        return scene(nominal, views, self.pixels, np.radians(self.steepest), masks, self.per_edge, self.lifted)
 
     def _found(self, seen: Scene, pictures: Pictures, state: State, freedom: Freedom) -> Facets:
         """Return what the pictures say about the facets in the end, as `uncertainty` needs it."""
         columns, whole = needed_columns(freedom, self.systematic), self.systematic is not None
         return facets(seen, pictures.sharp, state.views, state.deviation, state.weights, columns, power=2, whole=whole)
 
-    def _good(self, found: Facets) -> Booleans:
-        """Tell which facets agree between the pictures, (f,)."""
+    def _good(self, seen: Scene, found: Facets) -> Booleans:
+        """Tell which facets agree between the pictures, (f,).
+
+        At the edge of what is seen it takes more. What only priors tell about the cameras lets the pictures agree and
+        slip over the part together: its outline is then not where they say, and the background shines in.
+        """
         median = np.median(found.noise)
-        return (found.correlation >= self.poorest) & (found.noise <= NOISY * median)
-
-
-def _frayed(seen: Scene, found: Facets) -> bool:
-    """Tell whether the background shines in at the edge of what is seen.
-
-    What only priors tell about the cameras lets the pictures agree and slip over the part together: its outline is then
-    not where they say.
-    """
-    rim = seen.rim & (found.freedom > 0)
-    return bool(np.mean(found.noise[rim] > FRAYED * np.median(found.noise)) > FEW)
+        frayed = seen.rim & (found.noise > FRAYED * median) & (found.correlation < CLEAR)
+        return (found.correlation >= self.poorest) & (found.noise <= NOISY * median) & ~frayed
 
 
 def _require_coarse(seen: Scene, pictures: Pictures, views: Sequence[View]) -> None:

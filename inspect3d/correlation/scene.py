@@ -13,7 +13,7 @@ from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.camera import View
 from inspect3d.correlation.evaluation import EvaluationPoints, evaluation_points, points_per_edge
 from inspect3d.correlation.factor import Ordering
-from inspect3d.correlation.visibility import OUTLINE, visibility
+from inspect3d.correlation.visibility import visibility
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
 
@@ -206,7 +206,6 @@ def scene(
     masks: Sequence[Booleans | None],
     per_edge: int | None = None,
     lifted: bool = True,
-    margin: float = OUTLINE,
 ) -> Scene:
     """Return what the views see of a part.
 
@@ -217,7 +216,6 @@ def scene(
     masks : of each view, True where its picture may be used, or None
     per_edge : evaluation points along the edge of every facet, in place of `pixels`
     lifted : points on the nominal surface; else on the flat facets
-    margin : px, by which points must lie within the outline of the part in the pictures
 
     Raises
     ------
@@ -227,7 +225,7 @@ def scene(
     mesh = nominal.mesh
     count = points_per_edge(mesh, views, pixels) if per_edge is None else np.full(len(mesh.triangles), per_edge)
     points = evaluation_points(nominal, count, lifted)
-    see = visibility(nominal, points, views, steepest, masks, margin)
+    see = visibility(nominal, points, views, steepest, masks)
     facet = points.facet
     counts = np.bincount(facet[see.used], minlength=len(mesh.triangles))
     kept = np.flatnonzero(counts >= FEWEST)

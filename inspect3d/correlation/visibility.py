@@ -36,16 +36,11 @@ class Visibility:
 
 
 def visibility(
-    nominal: Nominal,
-    points: EvaluationPoints,
-    views: Sequence[View],
-    steepest: float,
-    masks: Sequence[Booleans | None],
-    margin: float = OUTLINE,
+    nominal: Nominal, points: EvaluationPoints, views: Sequence[View], steepest: float, masks: Sequence[Booleans | None]
 ) -> Visibility:
     """Return which points are seen by rays from the cameras to the nominal surface.
 
-    A camera sees a point that lies in its picture (three pixels within the border), `margin` px or more within the
+    A camera sees a point that lies in its picture (three pixels within the border), four pixels or more within the
     outline of the part, where a blurred picture mixes it with what is behind, and in the mask; whose normal leans at
     most `steepest` rad towards the line of sight, and that no other part of the nominal surface hides. A view takes
     part in a facet of which it sees at least half the points.
@@ -62,7 +57,7 @@ def visibility(
     lifted = points.places + (LIFT * nominal.diagonal + 2 * points.chord) * normals
     seen = np.empty((len(views), len(points)), dtype=np.bool_)
     for row, view, mask in zip(seen, views, masks, strict=True):
-        _write_seen(nominal, points.places, normals, lifted, view, steepest, mask, margin, row)
+        _write_seen(nominal, points.places, normals, lifted, view, steepest, mask, row)
     taking, used = np.empty((len(mesh.triangles), len(views)), dtype=np.bool_), np.empty(len(points), dtype=np.bool_)
     write_used(points.starts, seen, SHARE, taking, used)
     return Visibility(seen, taking, used)
@@ -76,14 +71,13 @@ def _write_seen(
     view: View,
     steepest: float,
     mask: Booleans | None,
-    margin: float,
     seen: Booleans,
 ) -> None:
     from inspect3d.correlation.point_kernel import write_in_sight
 
     camera, pose = view.camera, view.camera_from_cad
     rig = (camera.matrix, camera.distortion, pose.rotation, pose.translation)
-    allowed = _within_outline(nominal.mesh, view, margin)
+    allowed = _within_outline(nominal.mesh, view)
     if mask is not None:
         allowed = allowed & mask
     write_in_sight(places, normals, rig, view.centre, np.cos(steepest), MARGIN, allowed, seen)
@@ -91,7 +85,7 @@ def _write_seen(
     seen[near] = ~nominal.surface.hides(lifted[near], view.centre)
 
 
-def _within_outline(mesh: InspectionMesh, view: View, margin: float) -> Booleans:
+def _within_outline(mesh: InspectionMesh, view: View) -> Booleans:
     """Return the pixels (rows, columns) that lie well inside the picture of the facets that face the camera."""
     import cv2
 
@@ -106,4 +100,4 @@ def _within_outline(mesh: InspectionMesh, view: View, margin: float) -> Booleans
     for triangle in np.rint(pixels * 2**FINE).astype(np.int32):
         cv2.fillConvexPoly(filled, triangle, 1, shift=FINE)
     framed = cv2.copyMakeBorder(filled, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
-    return np.asarray(cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1] > margin)
+    return np.asarray(cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1] > OUTLINE)
