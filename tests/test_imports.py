@@ -37,6 +37,7 @@ PIPELINE = (
     {"record"},
     {"report"},
     {"setting", "registry", "listing", "summary"},
+    {"job"},
     {"inspection"},
     {"doctor", "demo"},
     {"cli"},

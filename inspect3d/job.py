@@ -1,0 +1,191 @@
+"""One measurement of an inspection: from the open files of a recipe's table to the map in the common alignment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from inspect3d.arrays import Booleans
+from inspect3d.compare.tolerances import excluded, tolerances
+from inspect3d.compare.verdict import verdict
+from inspect3d.deviate.deviate import Deviate
+from inspect3d.deviate.deviation import Deviation
+from inspect3d.deviate.nodes import DeviateNodes
+from inspect3d.measure import Cloud, Measure, Measurement, NodalMeasurement
+from inspect3d.nominal.nominal import Nominal
+from inspect3d.outcome import MeasurementError, Status
+from inspect3d.pose import Pose
+from inspect3d.progress import Progress
+from inspect3d.recipe import Budget, Coating, MeasurementTable, Recipe, Start
+from inspect3d.record import MeasuredPart
+from inspect3d.register.alignment import Alignment, NoAlignmentError
+from inspect3d.register.landmarks import landmark_covariance, pose_from_landmarks
+from inspect3d.register.register import Register
+
+REFERENCE = 20.0  # degC at which dimensions hold (ISO 1)
+BARE = Coating(thickness=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """A measurement of the recipe, its method built and its files open."""
+
+    table: MeasurementTable
+    method: Measure
+    source: Any
+
+
+def measured(job: Job, recipe: Recipe, nominal: Nominal, progress: Progress) -> MeasuredPart:
+    """Return how a measurement ended."""
+    table = job.table
+    ended = MeasuredPart(table.name, table.method, repr(job.method), Status.FAILED)
+    try:
+        with progress.stage("measuring", table.name):
+            measurement = job.method(job.source, nominal)
+        if isinstance(measurement, NodalMeasurement):
+            ended = _of_nodes(ended, measurement, table, recipe, nominal, progress)
+        else:
+            ended = _of_clouds(ended, measurement, table, recipe, nominal, progress)
+    except NoAlignmentError as error:
+        ended = replace(ended, status=error.status, reason=str(error), candidates=error.candidates)
+    except MeasurementError as error:
+        ended = replace(ended, reason=str(error))
+    return replace(ended, seconds=dict(progress.seconds[table.name]))
+
+
+def _registered(measurement: Measurement, table: MeasurementTable, nominal: Nominal) -> tuple[Alignment, ...]:
+    start = _start(table.alignment, measurement)
+    register = Register(nominal, start, table.alignment.refine, table.reach)
+    alignments = tuple(register(cloud) for cloud in measurement.clouds)
+    if table.alignment.start == "landmarks" and not table.alignment.refine:
+        cad = np.array([mark.cad for mark in table.alignment.landmarks])
+        measured = np.array([mark.measured for mark in table.alignment.landmarks])
+        return tuple(replace(a, covariance=landmark_covariance(measured, cad, a.origin)) for a in alignments)
+    return alignments
+
+
+def _start(alignment: Start, measurement: Measurement) -> Pose | None:
+    """Return the pose the alignment begins with, or None to search for it."""
+    if alignment.start == "landmarks":
+        return pose_from_landmarks(
+            np.array([mark.measured for mark in alignment.landmarks]),
+            np.array([mark.cad for mark in alignment.landmarks]),
+        )
+    if alignment.matrix is not None:
+        return Pose.from_matrix(np.array(alignment.matrix))
+    if alignment.start == "identity" or measurement.frame == "cad":
+        return Pose.identity()
+    return None
+
+
+def _of_clouds(
+    ended: MeasuredPart,
+    measurement: Measurement,
+    table: MeasurementTable,
+    recipe: Recipe,
+    nominal: Nominal,
+    progress: Progress,
+) -> MeasuredPart:
+    """Return how a measurement of points ended: they are registered, and the map is fitted to them."""
+    measurement = _at_reference_temperature(measurement, recipe.report.budget)
+    coating = table.coating or BARE
+    with progress.stage("registering", table.name):
+        alignments = _registered(measurement, table, nominal)
+    with progress.stage("measuring deviations", table.name):
+        deviate = Deviate(
+            refine=table.alignment.refine,
+            reach=table.reach,
+            coating=coating.thickness,
+            coating_sigma=coating.sigma,
+            calibration=recipe.report.budget.calibration,
+        )
+        found = deviate(measurement.clouds, alignments, nominal, _counted(recipe, nominal))
+    return replace(
+        _judged(ended, found.deviation, found.alignments, recipe, nominal),
+        points_cad=found.points_cad,
+        point_deviation=found.distance,
+        noise=found.noise,
+        remarks=(*measurement.remarks, *found.remarks),
+    )
+
+
+def _of_nodes(
+    ended: MeasuredPart,
+    measurement: NodalMeasurement,
+    table: MeasurementTable,
+    recipe: Recipe,
+    nominal: Nominal,
+    progress: Progress,
+) -> MeasuredPart:
+    """Return how a measurement that moved the nodes ended: the map is there, and brought into the common alignment."""
+    growth, coating = _growth(recipe.report.budget), table.coating or BARE
+    with progress.stage("measuring deviations", table.name):
+        deviate = DeviateNodes(
+            refine=table.alignment.refine,
+            reach=table.reach,
+            coating=coating.thickness,
+            coating_sigma=coating.sigma,
+            calibration=recipe.report.budget.calibration,
+            growth=growth,
+        )
+        found = deviate(measurement, nominal, _counted(recipe, nominal))
+    remarks = measurement.remarks
+    if growth:
+        remarks = (*remarks, _growth_words("The shape was", growth, recipe.report.budget))
+    return replace(
+        _judged(ended, found.deviation, (found.alignment,), recipe, nominal),
+        views=found.views,
+        residual=measurement.residual,
+        hidden=measurement.hidden,
+        contributions=measurement.contributions,
+        figures=measurement.figures,
+        remarks=remarks,
+    )
+
+
+def _counted(recipe: Recipe, nominal: Nominal) -> Booleans:
+    return ~excluded(recipe.part, nominal.mesh.nodes, nominal.mesh.face)
+
+
+def _judged(
+    ended: MeasuredPart,
+    deviation: Deviation,
+    alignments: tuple[Alignment, ...],
+    recipe: Recipe,
+    nominal: Nominal,
+) -> MeasuredPart:
+    limits = tolerances(recipe.part, nominal.mesh)
+    order = list(Status)
+    return replace(
+        ended,
+        status=max((alignment.status for alignment in alignments), key=order.index),
+        alignments=alignments,
+        deviation=deviation,
+        verdict=None if limits is None else verdict(deviation, limits, recipe.part.probability),
+    )
+
+
+def _growth(budget: Budget) -> float:
+    """Return by which share of its size the part was larger than at 20 degC."""
+    return budget.expansion * (budget.temperature - REFERENCE)
+
+
+def _growth_words(what: str, growth: float, budget: Budget) -> str:
+    return (
+        f"{what} scaled by {1 / (1 + growth):.7f} from {budget.temperature:g} °C to the reference temperature of "
+        f"{REFERENCE:g} °C (expansion {budget.expansion:g} 1/K)."
+    )
+
+
+def _at_reference_temperature(measurement: Measurement, budget: Budget) -> Measurement:
+    """Return the measurement as it would be at 20 degC: the points shrunk by the thermal expansion of the part."""
+    growth = _growth(budget)
+    if growth == 0:
+        return measurement
+    clouds = tuple(
+        Cloud(cloud.name, cloud.points / (1 + growth), cloud.normals, cloud.noise) for cloud in measurement.clouds
+    )
+    words = _growth_words("The points were", growth, budget)
+    return replace(measurement, clouds=clouds, remarks=(*measurement.remarks, words))
