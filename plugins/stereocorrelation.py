@@ -197,6 +197,11 @@ class Stereocorrelation:
 
     def _require_start(self, rig: Rig | None, count: int) -> None:
         placed = rig is not None and (rig.camera_from_cad or (rig.camera_from_rig and self.alignment.start != "auto"))
+        if not (placed or self.alignment.refine):
+            raise InputError(
+                "refine = false keeps the part in the place it is said to have, and nothing says it: name `cameras` "
+                "with their camera_from_cad, give alignment.start, or leave refine away."
+            )
         if placed or len(self.landmarks) >= FEWEST:
             return
         if self.landmarks:

@@ -301,6 +301,13 @@ def test_mistakes_in_the_recipe_are_told_before_anything_is_measured(folder, mea
         check(recipe(folder, measurement))
 
 
+@pytest.mark.parametrize("known", ["rig", "lenses"])
+def test_a_place_that_nothing_tells_is_not_kept(folder, views, known):
+    text = f'cameras = "{known}.json"\nalignment = {{ refine = false }}\n' + landmarks(views)
+    with pytest.raises(InputError, match="refine = false keeps the part in the place it is said to have"):
+        check(recipe(folder, text))
+
+
 def test_one_picture_twice_and_a_single_picture_are_refused(folder):
     text = recipe(folder, 'cameras = "placed.json"').read_text()
     for images, says in (('"left.png", "left.png"', "the same picture"), ('"left.png"', "two pictures or more")):
