@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -124,7 +125,8 @@ def test_every_error_is_a_sentence_and_a_status(called, monkeypatch, error, stat
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no signals to send")
 def test_an_interrupted_command_says_so_and_exits_with_130(tmp_path):
     command = [sys.executable, "-m", "inspect3d", "virtual", "milled", "-o", str(tmp_path / "milled")]
-    running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    heeding = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a background job would inherit that it is ignored
+    running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=heeding)
     time.sleep(1.5)
     running.send_signal(signal.SIGINT)
     _, words = running.communicate(timeout=60)
