@@ -256,26 +256,19 @@ def test_picks_in_the_wrong_order_are_refused(folder, views):
     assert "order" in reason
 
 
-def test_a_mesh_ten_times_too_fine_gives_no_plausible_map(folder):
-    part, nominal = inspected(
-        folder, 'cameras = "placed.json"\nsystematic = 0.0\nalignment = { start = "identity" }\n', element=0.35
-    )
-    if part.deviation is None:
-        assert "element_size" in part.reason
-        return
-    _, z = errors(part, nominal)
-    assert rms(z) < 1.5
+def test_a_mesh_ten_times_too_fine_is_refused_with_a_size_that_serves(folder):
+    reason = failed(folder, 'cameras = "placed.json"\n', element=0.35)
+    assert reason.startswith("The mesh is too fine for the speckle")
+    size = float(reason.split("element_size of ")[1].split(" mm")[0])
+    assert 1.0 < size < 4.0
 
 
-def test_a_flat_part_with_free_lenses_gives_no_plausible_map(tmp_path, views):
+def test_a_flat_part_with_free_lenses_claims_no_more_than_it_tells(tmp_path, views):
     cad(tmp_path, plane)
     photographs(tmp_path, views, height=plane, normals=plane_normals)
     part, nominal = inspected(tmp_path, "focal = 2472.0\n" + landmarks(views, 1.0, plane))
-    if part.deviation is None:
-        assert "flat" in part.reason
-        return
     _, z = errors(part, nominal, growth=True)
-    assert part.hidden
+    assert len(part.hidden) > 3
     assert rms(z) < 1.5
 
 
