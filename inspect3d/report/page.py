@@ -60,7 +60,10 @@ def page(
         inputs=record.inputs,
         versions=list(record.versions.items()),
         with_map=with_map,
+        pane_css=Markup(_asset("pane.css")),
         css=Markup(_asset("report.css")),
+        surface_code=Markup(_asset("surface.js")),
+        pane_code=Markup(_asset("pane.js")),
         viewer_code=Markup(_asset("viewer.js")),
         viewer_data=Markup(viewer_data(record, _start(shown)) if with_map else ""),
     )
