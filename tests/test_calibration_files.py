@@ -45,6 +45,24 @@ def storage(path, **matrices):
     file.release()
 
 
+def test_cameras_that_name_their_images_are_found_by_them_in_any_order_and_number(tmp_path):
+    file = tmp_path / "calibration.json"
+    written = rig(camera_from_cad=(Pose.identity(), SECOND))
+    write_calibration_json(file, written, PAIR)
+    same_cameras(load_calibration((file,), PAIR, SIZES), written)
+    turned = load_calibration((file,), PAIR[::-1], SIZES[::-1])
+    same_cameras(turned, Rig(written.cameras[::-1]))
+    np.testing.assert_allclose(turned.camera_from_cad[0].matrix, SECOND.matrix, atol=1e-15)
+    assert load_calibration((file,), PAIR[1:], SIZES[1:]).sigmas == (None,)
+    with pytest.raises(InputError, match=r"no camera whose image is other.png: it has left.png, right.png"):
+        load_calibration((file,), ("other.png",), SIZES[:1])
+    content = json.loads(file.read_text())
+    del content["cameras"][0]["image"]
+    file.write_text(json.dumps(content))
+    with pytest.raises(InputError, match="every camera an image of its own, or none"):
+        load_calibration((file,), PAIR, SIZES)
+
+
 @pytest.mark.parametrize("key", ["camera_from_cad", "camera_from_rig", None])
 def test_our_own_file_gives_the_rig_back_to_the_last_digit(key, tmp_path):
     poses = (Pose.identity(), SECOND)

@@ -43,7 +43,7 @@ def table(folder):
 
 def rig_of(folder):
     text = (folder / "calibration.json").read_text(encoding="utf-8")
-    return read_calibration_json(text, "calibration.json", (TINY.size, TINY.size))
+    return read_calibration_json(text, "calibration.json", ("left.png", "right.png"), (TINY.size, TINY.size))
 
 
 @pytest.mark.parametrize("kind", KNOWLEDGE)

@@ -1,4 +1,7 @@
-"""Our own calibration files: `{"cameras": [{"matrix", "distortion", "size", "camera_from_cad", "sigma"}, ...]}`."""
+"""Our own calibration files: `{"cameras": [{"matrix", "distortion", "size", "camera_from_cad", "sigma"}, ...]}`.
+
+Cameras stand in the order of the pictures. Where every one names its `image`, a recipe may use some of the pictures.
+"""
 
 from __future__ import annotations
 
@@ -15,12 +18,12 @@ from inspect3d.files.calibration_camera import Sizes, checked_camera, require_on
 from inspect3d.outcome import InputError
 from inspect3d.pose import Pose
 
-KEYS = {"matrix", "distortion", "size", "camera_from_cad", "camera_from_rig", "sigma"}
+KEYS = {"image", "matrix", "distortion", "size", "camera_from_cad", "camera_from_rig", "sigma"}
 DEFAULTS = (("matrix", None), ("distortion", [0.0] * 5))
 SIGMAS = {"focal", "centre", "distortion", "rotation", "translation"}
 
 
-def read_calibration_json(text: str, name: str, sizes: Sizes) -> Rig:
+def read_calibration_json(text: str, name: str, names: tuple[str, ...], sizes: Sizes) -> Rig:
     """Return the cameras of a calibration file of ours; see `load_calibration`."""
     try:
         content = json.loads(text)
@@ -28,7 +31,7 @@ def read_calibration_json(text: str, name: str, sizes: Sizes) -> Rig:
         raise InputError(f"{name} is not valid JSON: {error}.") from error
     if not isinstance(content, dict) or not isinstance(content.get("cameras"), list):
         raise InputError(f'{name} is no calibration: it wants {{ "cameras": [ ... ] }}, one entry per picture.')
-    entries = content["cameras"]
+    entries = _of_pictures(content["cameras"], name, names)
     require_one_each(len(entries), len(sizes), name)
     cameras = tuple(_camera(*pair, f"{name}, camera {k}") for k, pair in enumerate(zip(entries, sizes, strict=True), 1))
     sigmas = tuple(_sigma(entry.get("sigma"), f"{name}, camera {k}") for k, entry in enumerate(entries, 1))
@@ -45,11 +48,17 @@ def read_calibration_json(text: str, name: str, sizes: Sizes) -> Rig:
     )
 
 
-def write_calibration_json(path: Path, rig: Rig) -> None:
-    """Write cameras as a calibration file of ours; it reads back to the last digit."""
+def write_calibration_json(path: Path, rig: Rig, names: tuple[str, ...] = ()) -> None:
+    """Write cameras as a calibration file of ours; it reads back to the last digit.
+
+    Parameters
+    ----------
+    names : of the pictures, if the file is to tell which camera took which
+    """
     cameras = []
     for k, camera in enumerate(rig.cameras):
-        entry: dict[str, Any] = {
+        entry: dict[str, Any] = {"image": names[k]} if names else {}
+        entry |= {
             "matrix": camera.matrix.tolist(),
             "distortion": camera.distortion.tolist(),
             "size": list(camera.size),
@@ -63,6 +72,19 @@ def write_calibration_json(path: Path, rig: Rig) -> None:
             entry["sigma"] = {**vars(sigma), "distortion": sigma.distortion.tolist()}
         cameras.append(entry)
     path.write_text(json.dumps({"schema": 1, "cameras": cameras}, indent=2) + "\n", encoding="utf-8")
+
+
+def _of_pictures(entries: list[Any], name: str, names: tuple[str, ...]) -> list[Any]:
+    """Return the entries that belong to the pictures: by their `image` where all have one, else as they stand."""
+    by_image = {entry["image"]: entry for entry in entries if isinstance(entry, Mapping) and "image" in entry}
+    if not by_image:
+        return entries
+    if len(by_image) < len(entries):
+        raise InputError(f"{name}: give every camera an image of its own, or none.")
+    missing = [picture for picture in names if picture not in by_image]
+    if missing:
+        raise InputError(f"{name} holds no camera whose image is {missing[0]}: it has {', '.join(map(str, by_image))}.")
+    return [by_image[picture] for picture in names]
 
 
 def _camera(entry: Any, size: tuple[int, int], where: str) -> Camera:

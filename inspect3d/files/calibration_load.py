@@ -43,7 +43,7 @@ def load_calibration(files: tuple[Path, ...], names: tuple[str, ...], sizes: Siz
     if data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
         return _read_xml(data, files, sizes)
     if b'"cameras"' in data:
-        return read_calibration_json(data.decode("utf-8-sig", errors="replace"), first.name, sizes)
+        return read_calibration_json(data.decode("utf-8-sig", errors="replace"), first.name, names, sizes)
     if data.startswith((b"%YAML", b"---", b"{")):
         return read_calibration_opencv(files, sizes)
     raise InputError(f"{first.name} is no calibration that inspect3d reads: {KINDS}.")

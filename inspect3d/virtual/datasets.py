@@ -11,15 +11,17 @@ import numpy as np
 from inspect3d.outcome import InputError
 from inspect3d.virtual.bracket import bracket
 from inspect3d.virtual.dataset import Dataset
-from inspect3d.virtual.deviation_field import Bump, FacetErrors, Scallops, Step, Sum, Wave, Within
+from inspect3d.virtual.deviation_field import Bump, Sum, Wave
 from inspect3d.virtual.freeform import FreeformSizes, freeform, freeform_patch
 from inspect3d.virtual.laser_scanner import LaserScanner
-from inspect3d.virtual.milled import MilledSizes, milled
+from inspect3d.virtual.milled import machining, milled
 from inspect3d.virtual.picture_dataset import PictureDataset
 from inspect3d.virtual.picture_truth import PictureTruth
 from inspect3d.virtual.plan import load_plan
 from inspect3d.virtual.random_pose import random_pose
 from inspect3d.virtual.stereo_datasets import PHOTOGRAPHED
+from inspect3d.virtual.studies import STUDIES
+from inspect3d.virtual.study import Study
 from inspect3d.virtual.truth import Truth
 
 AROUND = ((0.25, 0.1, 1.0), (1.0, 0.3, 0.6), (0.2, 1.0, 0.7), (0.2, -1.0, 0.7), (-1.0, -0.2, 0.5))
@@ -88,7 +90,7 @@ noise = 0.02                     # mm, standard noise of a point
 """
 
 
-def make_dataset(name: str, folder: Path, seed: int = 0) -> Truth | PictureTruth:
+def make_dataset(name: str, folder: Path, seed: int = 0) -> Truth | PictureTruth | None:
     """Make one of `DATASETS`, or what a plan asks for, and write it into a folder.
 
     Parameters
@@ -152,11 +154,6 @@ def _freeform(seed: int) -> Dataset:
 
 def _milled(seed: int) -> Dataset:
     """Mismatch of 40 µm on the cylindrical section, 15 µm errors on the facets, 12 µm scallops."""
-    sizes = MilledSizes()
-    low, high = (sizes.facet_borders[0], -1.0, 1.0), (sizes.length + 1.0, sizes.width + 1.0, sizes.length)
-    mismatch = Step(0.040, point=(sizes.section_start, 0.0, 0.0), normal=(1.0, 0.0, 0.0))
-    facets = FacetErrors(sizes.facet_borders, heights=(0.015, -0.015, 0.015, -0.015), direction=(1.0, 0.0, 0.0))
-    scallops = Scallops(0.012, pitch=1.6, direction=(1.0, 0.0, 0.0))
     scanner = LaserScanner(
         noise=0.02,
         views=ABOVE,
@@ -165,10 +162,12 @@ def _milled(seed: int) -> Dataset:
         foreign=0.03,
         scan_from_cad=random_pose(np.random.default_rng(seed)),
     )
-    return Dataset(milled(sizes), Within(mismatch + facets + scallops, low, high), scanner, MILLED_RECIPE)
+    return Dataset(milled(), machining(pitch=1.6), scanner, MILLED_RECIPE)
 
 
 SCANNED: Mapping[str, Callable[[int], Dataset]] = MappingProxyType(
     {"bracket": _bracket, "freeform": _freeform, "milled": _milled}
 )
-DATASETS: Mapping[str, Callable[[int], Dataset | PictureDataset]] = MappingProxyType({**SCANNED, **PHOTOGRAPHED})
+DATASETS: Mapping[str, Callable[[int], Dataset | PictureDataset | Study]] = MappingProxyType(
+    {**SCANNED, **PHOTOGRAPHED, **STUDIES}
+)

@@ -83,7 +83,7 @@ class PictureDataset:
                 (folder / name).write_bytes(_png(camera, scene, own))
             if self.knowledge is not None:
                 rig = self.knowledge(views, np.random.default_rng(seeds[-2]))
-                write_calibration_json(folder / "calibration.json", rig)
+                write_calibration_json(folder / "calibration.json", rig, self.names)
             truth.write(folder / "truth.json")
             (folder / "recipe.toml").write_text(Template(self.recipe).substitute(values), encoding="utf-8")
         except OSError as error:

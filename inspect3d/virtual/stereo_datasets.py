@@ -9,9 +9,9 @@ from types import MappingProxyType
 import numpy as np
 
 from inspect3d.virtual.camera_knowledge import CameraKnowledge, LensesKnown, places_known, rig_known
-from inspect3d.virtual.deviation_field import Bump, DeviationField, FacetErrors, Scallops, Step, Sum, Wave, Within
+from inspect3d.virtual.deviation_field import Bump, DeviationField, Sum, Wave
 from inspect3d.virtual.freeform import FreeformSizes, freeform, freeform_patch
-from inspect3d.virtual.milled import MilledSizes, milled
+from inspect3d.virtual.milled import machining, milled
 from inspect3d.virtual.part import Part
 from inspect3d.virtual.picture_dataset import PictureDataset
 from inspect3d.virtual.sensor import Sensor
@@ -38,6 +38,7 @@ images = [$images]
 CAMERAS = 'cameras = "calibration.json"\n'
 PLACED = 'alignment = { start = "identity", refine = false }\n'
 FOCAL = "focal = $focal                   # px, a few per cent off\n"
+MILLED_MIDDLE = (50.0, 35.0, 26.0)
 LANDMARKS = "landmarks = [\n$landmarks]\n"
 
 
@@ -50,20 +51,14 @@ def smooth_stereo(
     form = Sum((Wave(0.02, (0.009, 0.004, 0.0), 0.3), Wave(0.015, (-0.005, 0.012, 0.0), 1.9)))
     deviation = form + Bump(tuple(bump.tolist()), height=0.1, width=12.0)
     recipe = HEAD.format(title="Freeform sheet", name=name, element_size=element_size) + CAMERAS + PLACED
-    return _dataset(freeform(sizes), deviation, rig or StereoRig(), tuple(middle.tolist()), seed, recipe)
+    return photographed(freeform(sizes), deviation, rig or StereoRig(), tuple(middle.tolist()), seed, recipe)
 
 
 def milled_stereo(seed: int, rig: StereoRig | None = None, scallop: float = 0.012) -> PictureDataset:
     """Return the milled block: 40 µm mismatch, 15 µm errors on the facets, 12 µm scallops; cameras known."""
-    sizes = MilledSizes()
-    low, high = (sizes.facet_borders[0], -1.0, 1.0), (sizes.length + 1.0, sizes.width + 1.0, sizes.length)
-    mismatch = Step(0.040, point=(sizes.section_start, 0.0, 0.0), normal=(1.0, 0.0, 0.0))
-    facets = FacetErrors(sizes.facet_borders, heights=(0.015, -0.015, 0.015, -0.015), direction=(1.0, 0.0, 0.0))
-    scallops = Scallops(scallop, pitch=4.0, direction=(1.0, 0.0, 0.0))
-    deviation = Within(mismatch + facets + scallops, low, high)
     recipe = HEAD.format(title="Milled block", name="milled-stereo", element_size=2.0) + CAMERAS + PLACED
-    middle = (sizes.length / 2, sizes.width / 2, 26.0)
-    return _dataset(milled(sizes), deviation, rig or StereoRig(), middle, seed, recipe)
+    deviation = machining(pitch=4.0, scallop=scallop)
+    return photographed(milled(), deviation, rig or StereoRig(), MILLED_MIDDLE, seed, recipe)
 
 
 def knowing(dataset: PictureDataset, knowledge: CameraKnowledge | None, picked: int = 6) -> PictureDataset:
@@ -73,7 +68,7 @@ def knowing(dataset: PictureDataset, knowledge: CameraKnowledge | None, picked: 
     return replace(dataset, knowledge=knowledge, picked=picked, recipe=recipe)
 
 
-def _dataset(
+def photographed(
     part: Part,
     deviation: DeviationField,
     rig: StereoRig,
