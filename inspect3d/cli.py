@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from inspect3d import __version__
+from inspect3d.demo import Demo
 from inspect3d.outcome import InputError, InspectionError
 
 DONE, UNANSWERED, WRONG_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 70, 130
@@ -101,13 +102,16 @@ def run(
 
 @app.command()
 def demo(
+    name: Annotated[Demo, typer.Argument(help="The part: by several methods, or by a small scan.")] = Demo.MILLED,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the results.")] = Path("out/demo"),
 ) -> None:
-    """Inspect a simulated laser scan of a small bracket."""
+    """Inspect a virtual part; its data set stays beside the results."""
     from inspect3d.demo import demo_recipe
+    from inspect3d.terminal import terminal
 
-    with demo_recipe() as recipe:
-        _inspect(recipe, out)
+    with terminal(sys.stderr) as progress:
+        recipe = demo_recipe(name, out.with_name(f"{out.name}-data"), progress)
+    _inspect(recipe, out)
 
 
 @app.command()

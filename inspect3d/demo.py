@@ -1,27 +1,38 @@
-"""The part that `inspect3d demo` inspects."""
+"""The virtual parts that `inspect3d demo` inspects."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from enum import StrEnum
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import inspect3d
+from inspect3d.progress import Progress
 
 
-@contextmanager
-def demo_recipe() -> Iterator[Path]:
-    """Return the recipe of the bracket: the repository's data set, or where there is none the same one made anew.
+class Demo(StrEnum):
+    """What there is to see; the value is what the user types."""
 
-    A data set made anew lasts as long as the block.
+    MILLED = "milled"
+    BRACKET = "bracket"
+
+    @property
+    def dataset(self) -> str:
+        """Return the name of its virtual dataset."""
+        return {Demo.MILLED: "milled-study", Demo.BRACKET: "bracket"}[self]
+
+
+def demo_recipe(demo: Demo, folder: Path, progress: Progress) -> Path:
+    """Return the recipe of a demo: the repository's dataset, or where there is none one made anew.
+
+    Parameters
+    ----------
+    folder : where a dataset is made; what an earlier demo left there is replaced
     """
-    recipe = Path(inspect3d.__file__).parents[1] / "datasets" / "bracket" / "recipe.toml"
-    if recipe.exists():
-        yield recipe
-        return
+    shipped = Path(inspect3d.__file__).parents[1] / "datasets" / demo.dataset / "recipe.toml"
+    if shipped.exists():
+        return shipped
     from inspect3d.virtual.datasets import make_dataset
 
-    with TemporaryDirectory(prefix="inspect3d-demo-") as folder:
-        make_dataset("bracket", Path(folder))
-        yield Path(folder) / "recipe.toml"
+    with progress.stage(f"making the dataset {folder}"):
+        make_dataset(demo.dataset, folder)
+    return folder / "recipe.toml"

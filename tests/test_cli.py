@@ -218,13 +218,22 @@ def test_a_picture_of_a_folder_without_results_is_refused(called, tmp_path):
 
 
 def test_the_demo_takes_the_recipe_of_the_repository_or_makes_it_anew(monkeypatch, tmp_path):
-    from inspect3d.demo import demo_recipe
+    from inspect3d.demo import Demo, demo_recipe
+    from inspect3d.progress import Progress
 
-    with demo_recipe() as recipe:
-        assert recipe == Path(inspect3d.__file__).parents[1] / "datasets" / "bracket" / "recipe.toml"
-        assert recipe.exists()
+    shipped = Path(inspect3d.__file__).parents[1] / "datasets" / "bracket" / "recipe.toml"
+    assert demo_recipe(Demo.BRACKET, tmp_path / "data", Progress()) == shipped
+    assert shipped.exists()
+    made = []
+    monkeypatch.setattr("inspect3d.virtual.datasets.make_dataset", lambda *what: made.append(what))
+    assert demo_recipe(Demo.MILLED, tmp_path / "data", Progress()) == tmp_path / "data" / "recipe.toml"
     monkeypatch.setattr(inspect3d, "__file__", str(tmp_path / "inspect3d" / "__init__.py"))
-    monkeypatch.setattr("inspect3d.virtual.datasets.make_dataset", lambda name, folder: (folder / name).touch())
-    with demo_recipe() as recipe:
-        assert [path.name for path in recipe.parent.iterdir()] == ["bracket"]
-    assert not recipe.parent.exists()
+    demo_recipe(Demo.BRACKET, tmp_path / "bracket", Progress())
+    assert made == [("milled-study", tmp_path / "data"), ("bracket", tmp_path / "bracket")]
+
+
+def test_every_demo_has_its_dataset():
+    from inspect3d.demo import Demo
+    from inspect3d.virtual.datasets import DATASETS
+
+    assert {demo.dataset for demo in Demo} <= set(DATASETS)
