@@ -13,13 +13,16 @@ from importlib.metadata import version
 from pathlib import Path
 
 from inspect3d import __version__
+from inspect3d.compare.compare import Compare
+from inspect3d.compare.comparison import Comparison
+from inspect3d.compare.measured_map import MeasuredMap
 from inspect3d.job import Job, measured
 from inspect3d.nominal.load import load_nominal
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import InputError
 from inspect3d.progress import Progress
-from inspect3d.recipe import Recipe, load_recipe
-from inspect3d.record import InputFile, Record
+from inspect3d.recipe import MeasurementTable, Recipe, load_recipe
+from inspect3d.record import InputFile, MeasuredPart, Record
 from inspect3d.registry import build_for
 
 LIBRARIES = ("numpy", "scipy", "numba", "open3d", "pyvista", "pymeshlab", "trimesh", "cadquery-ocp-novtk")
@@ -78,7 +81,23 @@ def inspect(recipe: Recipe, progress: Progress) -> Record:
     with progress.stage("reading the CAD model"):
         nominal = _nominal(recipe)
     parts = tuple(measured(job, recipe, nominal, progress) for job in jobs)
-    return Record(recipe, nominal, parts, inputs, _versions(), _warnings(recipe))
+    with progress.stage("comparing the methods"):
+        comparisons = _compared(recipe, nominal, parts)
+    return Record(recipe, nominal, parts, inputs, _versions(), _warnings(recipe), comparisons)
+
+
+def _compared(recipe: Recipe, nominal: Nominal, parts: tuple[MeasuredPart, ...]) -> tuple[Comparison, ...]:
+    maps = []
+    for table, part in zip(recipe.measurements, parts, strict=True):
+        if part.deviation is not None and part.covariance is not None:
+            maps.append(MeasuredMap(part.name, part.deviation, part.covariance, _sources(recipe, table)))
+    return Compare()(tuple(maps), nominal.mesh)
+
+
+def _sources(recipe: Recipe, table: MeasurementTable) -> dict[str, str]:
+    """Return the names of the files a measurement rests on, by their SHA-256."""
+    paths = recipe.files(table).paths
+    return {_sha256(path): path.name for key in ("files", "images", "cameras") for path in paths.get(key, ())}
 
 
 def _jobs(recipe: Recipe) -> list[Job]:

@@ -104,6 +104,7 @@ def _of_clouds(
         found = deviate(measurement.clouds, alignments, nominal, _counted(recipe, nominal))
     return replace(
         _judged(ended, found.deviation, found.alignments, recipe, nominal),
+        covariance=found.covariance,
         points_cad=found.points_cad,
         point_deviation=found.distance,
         noise=found.noise,
@@ -136,6 +137,7 @@ def _of_nodes(
         remarks = (*remarks, _growth_words("The shape was", growth, recipe.report.budget))
     return replace(
         _judged(ended, found.deviation, (found.alignment,), recipe, nominal),
+        covariance=found.covariance,
         views=found.views,
         residual=measurement.residual,
         hidden=measurement.hidden,

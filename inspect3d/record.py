@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 from inspect3d.arrays import Floats, Integers
 from inspect3d.camera import View
+from inspect3d.compare.comparison import Comparison
 from inspect3d.deviate.deviation import Deviation
+from inspect3d.deviate.map_covariance import MapCovariance
 from inspect3d.figure import Figure
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import Status
@@ -30,6 +32,7 @@ class MeasuredPart:
     alignments : one per cloud that was aligned by itself; empty where there is no answer
     candidates : the poses considered, where the measurement ended ambiguous or failed
     deviation : the map, or None where there is none
+    covariance : how the errors of the map hang together; None where there is no map
     verdict : (n,) 0 none, 1 conform, 2 undecided, 3 nonconform, per node; None without a tolerance
     points_cad : (k, 3) mm, the measured points in the CAD frame in the order of the files; None for stereo methods
     point_deviation : (k,) mm, NaN where a point has none
@@ -51,6 +54,7 @@ class MeasuredPart:
     alignments: tuple[Alignment, ...] = ()
     candidates: tuple[Candidate, ...] = ()
     deviation: Deviation | None = None
+    covariance: MapCovariance | None = None
     verdict: Integers | None = None
     points_cad: Floats | None = None
     point_deviation: Floats | None = None
@@ -83,6 +87,7 @@ class Record:
     inputs : the files read
     versions : of inspect3d, Python and the libraries that computed the result
     warnings : what the recipe asked for and did not get, a sentence each
+    comparisons : of every two measurements that have a map, in the recipe's order
     """
 
     recipe: Recipe
@@ -91,3 +96,4 @@ class Record:
     inputs: tuple[InputFile, ...]
     versions: Mapping[str, str]
     warnings: tuple[str, ...] = ()
+    comparisons: tuple[Comparison, ...] = ()

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from inspect3d.deviate.map_covariance import Independent
 from inspect3d.deviate.nodes import DeviateNodes
 from inspect3d.measure import NodalMeasurement
 from inspect3d.outcome import MeasurementError, Status
@@ -20,17 +21,6 @@ NOMINAL = sheet(edge=4.0)
 MESH = NOMINAL.mesh
 EVERY = np.ones(len(MESH), bool)
 MOTION = np.array([2e-4, -1e-4, 3e-4, 0.01, -0.02, 0.015])
-
-
-class Independent:
-    """The covariance of nodes that have nothing to do with each other."""
-
-    def __init__(self, variances):
-        self.variances = variances
-
-    def covariance(self, columns):
-        """Return the covariance times columns."""
-        return self.variances[:, None] * columns
 
 
 def measured(value, sigma=0.002, mesh=MESH, **known):

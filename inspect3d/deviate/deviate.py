@@ -9,6 +9,7 @@ import numpy as np
 from inspect3d.arrays import Booleans, Floats
 from inspect3d.deviate.cloud_to_node import CloudToNode, NodeFit
 from inspect3d.deviate.deviation import Deviation
+from inspect3d.deviate.map_covariance import Independent, MapCovariance, pose_errors
 from inspect3d.measure import Cloud
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.nominal.surface import Feet
@@ -31,6 +32,7 @@ class CloudDeviation:
     Parameters
     ----------
     deviation : the map on the inspection mesh
+    covariance : how its errors hang together
     alignments : of the clouds, with the last step of the common alignment in them
     points_cad : (k, 3) mm, all points in the CAD frame, in order
     distance : (k,) mm, signed distance of each point; NaN where its foot lies on a rim or is out of reach
@@ -39,6 +41,7 @@ class CloudDeviation:
     """
 
     deviation: Deviation
+    covariance: MapCovariance
     alignments: tuple[Alignment, ...]
     points_cad: Floats
     distance: Floats
@@ -106,10 +109,12 @@ class Deviate:
                 break
             moved = Pose.small(motion, gauge.origin) @ moved
         deviation = self._map(fit, value, gauge, alignments, nominal)
+        covariance = self._covariance(fit, gauge, alignments)
         distance = np.where(feet.on_rim, np.nan, feet.distance - self.coating)
         distance[np.abs(feet.distance) > (self.reach or np.inf)] = np.nan
         placed = self._aligned(alignments, moved, clouds, distance)
-        return CloudDeviation(deviation, placed, moved(points), distance, fit.noise, self._remarks(nominal, feet))
+        remarks = self._remarks(nominal, feet)
+        return CloudDeviation(deviation, covariance, placed, moved(points), distance, fit.noise, remarks)
 
     def _remarks(self, nominal: Nominal, feet: Feet) -> tuple[str, ...]:
         reach = self.reach or FOREIGN * nominal.diagonal
@@ -162,6 +167,18 @@ class Deviate:
         full_value, full_sigma = np.full(len(fit.value), np.nan), np.full(len(fit.value), np.nan)
         full_value[seen], full_sigma[seen] = value, np.sqrt(variance)
         return Deviation(full_value, full_sigma, fit.observed)
+
+    def _covariance(self, fit: NodeFit, gauge: Gauge, alignments: tuple[Alignment, ...]) -> MapCovariance:
+        seen = np.flatnonzero(fit.observed)
+        rows = jacobian(gauge.nodes, gauge.normals, alignments[0].origin)
+        return MapCovariance(
+            node=seen,
+            own=Independent(fit.variance[seen]),
+            pose=np.zeros((len(seen), 0)) if self.refine else pose_errors(rows, alignments[0].covariance),
+            coating=(self.coating, self.coating_sigma),
+            calibration=self.calibration,
+            refined=self.refine,
+        )
 
     def _aligned(
         self, alignments: tuple[Alignment, ...], moved: Pose, clouds: tuple[Cloud, ...], distance: Floats

@@ -9,6 +9,7 @@ import numpy as np
 from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.camera import View
 from inspect3d.deviate.deviation import Deviation
+from inspect3d.deviate.map_covariance import MapCovariance, Selected, variances_without
 from inspect3d.measure import NodalMeasurement
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError, Status
@@ -29,11 +30,13 @@ class NodalDeviation:
     Parameters
     ----------
     deviation : the map on the inspection mesh
+    covariance : how its errors hang together
     alignment : cad_from_measured, with the motion and the scale of the common alignment in it
     views : the cameras in the CAD frame, moved along
     """
 
     deviation: Deviation
+    covariance: MapCovariance
     alignment: Alignment
     views: tuple[View, ...]
 
@@ -98,23 +101,21 @@ class DeviateNodes:
         motion = gauge.motion(value[seen]) if self.refine else np.zeros(gauge.jacobian.shape[1])
         shared = np.full(len(node), self.coating_sigma)
         shared = shared - modes @ (solver @ shared)
-        variance = _projected(measured, seen, modes, solver) + shared**2
+        covariance = MapCovariance(
+            node=node,
+            own=Selected(measured.uncertainty, np.flatnonzero(seen)),
+            pose=np.zeros((len(node), 0)),
+            coating=(self.coating, self.coating_sigma),
+            calibration=self.calibration,
+            refined=self.refine,
+            scale_known=measured.scale_known,
+        )
+        variance = variances_without(covariance.own, modes, solver) + shared**2
         variance = variance + self.calibration**2 + nominal.chord**2 / 3
         found = value[seen] + gauge.jacobian @ motion
         deviation = _spread(found, np.sqrt(variance), node, len(mesh))
         placed = _alignment(measured, gauge, motion, found, self.refine)
-        return NodalDeviation(deviation, placed, _moved(measured.views, gauge, motion))
-
-
-def _projected(measured: NodalMeasurement, seen: Booleans, modes: Floats, solver: Floats) -> Floats:
-    """Return the diagonal of (I - J M) S (I - J M)' over the seen nodes, for J = `modes` and M = `solver`."""
-    k = len(measured.node)
-    rows = np.zeros((k, len(solver)))
-    rows[seen] = solver.T
-    crossed = measured.uncertainty.covariance(rows)
-    between = np.einsum("ij,jk,ik->i", modes, rows.T @ crossed, modes)
-    variances = measured.uncertainty.variances[seen] - 2 * np.einsum("ij,ij->i", modes, crossed[seen]) + between
-    return np.maximum(variances, np.finfo(float).tiny)
+        return NodalDeviation(deviation, covariance, placed, _moved(measured.views, gauge, motion))
 
 
 def _spread(value: Floats, sigma: Floats, node: Integers, n: int) -> Deviation:

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from inspect3d.camera import View
+from inspect3d.compare.comparison import Comparison
+from inspect3d.compare.deviation_region import DeviationRegion
 from inspect3d.compare.tolerances import tolerances
 from inspect3d.deviate.statistics import Statistics, percentiles
 from inspect3d.nominal.nominal import InspectionMesh
@@ -36,7 +38,7 @@ def results(record: Record) -> dict[str, Any]:
         "inputs": [{"path": file.path, "sha256": file.sha256} for file in record.inputs],
         "warnings": list(record.warnings),
         "measurements": {part.name: _measurement(record, mesh, part) for part in record.parts},
-        "comparisons": [],
+        "comparisons": [_comparison(each) for each in record.comparisons],
     }
 
 
@@ -165,6 +167,38 @@ def _deviation(mesh: InspectionMesh, part: MeasuredPart) -> dict[str, Any] | Non
         | {"sigma_p50": float(median), "sigma_p95": float(high)}
         | {"observed_area": float(areas.sum() / mesh.areas.sum())}
     )
+
+
+def _comparison(comparison: Comparison) -> dict[str, Any]:
+    limits = comparison.limits_of_agreement
+    return {
+        "a": comparison.a,
+        "b": comparison.b,
+        "nodes": comparison.nodes,
+        "mean": comparison.mean,
+        "std": comparison.std,
+        "limits_of_agreement": list(limits) if limits else None,
+        "en_rms": comparison.en_rms,
+        "en_above_1": comparison.en_above_1,
+        "reason": comparison.reason,
+        "correlation": comparison.correlation,
+        "coverage": {"a": comparison.coverage_a, "b": comparison.coverage_b, "both": comparison.coverage},
+        "regions": None if comparison.regions is None else [_region(region) for region in comparison.regions],
+        "gauge": comparison.gauge,
+        "words": list(comparison.words),
+    }
+
+
+def _region(region: DeviationRegion) -> dict[str, Any]:
+    return {
+        "nodes": len(region.nodes),
+        "area": region.area,
+        "place": region.place.tolist(),
+        "height": region.height,
+        "mean": region.mean,
+        "sigma": region.sigma,
+        "p_value": region.p_value,
+    }
 
 
 def _label(reading: Reading) -> dict[str, Any]:
