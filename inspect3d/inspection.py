@@ -114,15 +114,9 @@ def _nominal(recipe: Recipe) -> Nominal:
 
 
 def _warnings(recipe: Recipe) -> tuple[str, ...]:
-    report = recipe.report
-    warnings = []
-    if "pdf" in report.formats:
-        warnings.append(
-            "The recipe asks for a PDF: this version writes the report as HTML only; print it from a browser."
-        )
-    if report.sections:
-        warnings.append("The recipe asks for sections: this version does not draw them.")
-    return tuple(warnings)
+    if recipe.report.sections:
+        return ("The recipe asks for sections: this version does not draw them.",)
+    return ()
 
 
 def _inputs(recipe: Recipe) -> tuple[InputFile, ...]:

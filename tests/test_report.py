@@ -86,7 +86,7 @@ def a_record(value=0.05, sigma=0.01, **changes):
 
 @pytest.fixture(scope="module")
 def record():
-    return a_record()
+    return a_record(formats=["html", "pdf"])
 
 
 @pytest.fixture(scope="module")

@@ -1,20 +1,37 @@
-"""What the report says of one measurement: rounded figures and words, ready for the page."""
+"""What the report says of one measurement: rounded figures and words."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from inspect3d.outcome import Status
 from inspect3d.record import MeasuredPart, Record
+from inspect3d.report.blocks import (
+    Badge,
+    Beside,
+    Block,
+    Bullets,
+    Chapter,
+    Code,
+    Folded,
+    Heading,
+    Note,
+    Paragraph,
+    Picture,
+    Share,
+    Shares,
+    Table,
+    Tiles,
+    table_of,
+)
 from inspect3d.report.colours import BAND_COLOURS, UNMEASURED
 from inspect3d.report.digits import COVERAGE, decimals, grouped, measured, number
-from inspect3d.report.pose_words import PoseWords, advice, alignment_rows, motions, poses
+from inspect3d.report.pose_words import advice, alignment_rows, motions, poses
 from inspect3d.report.reading import Reading, readings
-from inspect3d.report.uncertainty import Contribution, contributions
+from inspect3d.report.uncertainty import contributions
 from inspect3d.report.verdict_words import verdict_words
 
 Rows = list[tuple[str, str]]
@@ -23,75 +40,28 @@ SHARE_COLOURS = (BAND_COLOURS[2], BAND_COLOURS[3], BAND_COLOURS[4], UNMEASURED)
 
 
 @dataclass(frozen=True)
-class Share:
-    """A piece of the bar that shows how the area is judged."""
-
-    percent: str
-    colour: str
-    words: str
-
-
-@dataclass(frozen=True)
-class LabelWords:
-    """A row of the table of named points."""
-
-    name: str
-    point: str
-    value: str
-    verdict: str
-    distance: str
-
-
-@dataclass(frozen=True)
 class Account:
-    """One measurement, as the page shows it; empty where there is nothing to say.
+    """One measurement as the report shows it.
 
     Parameters
     ----------
-    name, method, provenance, status, reason, remarks : of the measurement; status in words
-    anchor : the place on the page
-    failed : there is no map
-    noteworthy : the status belongs into the summary
-    badge, badge_kind : the result in a word, and its colour
-    advice : what to do about a failure
+    part : the measurement
+    badge : its result in a word
+    row : its figures in the table at the head of the report; empty where there is no map
     verdict : on the tolerance, in a sentence
-    row : figures of the summary
-    tiles, statistics, alignment, motions : labels and figures
-    origin : about which the motions are meant
-    free : motions the points leave free
-    hidden : motions that the pictures of a stereo method cannot tell
+    chapter : all there is to say
     """
 
-    name: str
-    method: str
-    provenance: str
-    status: str
-    reason: str
-    remarks: tuple[str, ...]
-    anchor: str
-    failed: bool
-    noteworthy: bool
-    badge: str
-    badge_kind: str
-    advice: str = ""
-    verdict: str = ""
-    row: list[str] = field(default_factory=list)
-    shares: list[Share] = field(default_factory=list)
-    tiles: Rows = field(default_factory=list)
-    statistics: Rows = field(default_factory=list)
-    alignment: Rows = field(default_factory=list)
-    motions: Rows = field(default_factory=list)
-    origin: str = ""
-    free: tuple[str, ...] = ()
-    hidden: tuple[str, ...] = ()
-    poses: tuple[PoseWords, ...] = ()
-    labels: list[LabelWords] = field(default_factory=list)
-    uncertainty: tuple[Contribution, ...] = ()
-    seconds: Rows = field(default_factory=list)
-    pictures: list[Any] = field(default_factory=list)
+    part: MeasuredPart
+    badge: Badge
+    row: tuple[str, ...]
+    verdict: str
+    chapter: Chapter
 
 
-def account(record: Record, part: MeasuredPart, values: Mapping[str, Any], anchor: str, pictures: list[Any]) -> Account:
+def account(
+    record: Record, part: MeasuredPart, values: Mapping[str, Any], anchor: str, pictures: Sequence[Picture]
+) -> Account:
     """Return what the report says of a measurement.
 
     Parameters
@@ -99,47 +69,36 @@ def account(record: Record, part: MeasuredPart, values: Mapping[str, Any], ancho
     record : the inspection
     part : the measurement
     values : what results.json holds of it
-    anchor : its place on the page
-    pictures : as the template takes them
+    anchor : its place in the report
+    pictures : of it
     """
-    shared: dict[str, Any] = {
-        "name": part.name,
-        "method": part.method,
-        "provenance": part.provenance,
-        "status": part.status.words,
-        "reason": part.reason,
-        "remarks": part.remarks + tuple(remark for each in part.alignments for remark in each.remarks),
-        "anchor": anchor,
-        "noteworthy": part.status is not Status.OK,
-        "poses": poses(part),
-        "seconds": [(stage, number(seconds, 2)) for stage, seconds in part.seconds.items()],
-        "pictures": pictures,
-    }
+    remarks = part.remarks + tuple(remark for each in part.alignments for remark in each.remarks)
+    shown: list[Block] = [Bullets(remarks)] if remarks else []
+    shown += pictures
     if not part.status.has_map or part.deviation is None:
-        badge = part.status.value
-        return Account(**shared, failed=True, badge=badge, badge_kind=badge, advice=advice(part))
-    verdict = verdict_words(record, part)
-    figures = _Figures(values["deviation"])
-    first = part.alignments[0] if part.alignments else None
+        badge = Badge(part.status.value, part.status.value)
+        lines = tuple(words for words in (part.reason, advice(part)) if words)
+        blocks = (Note(part.status.words, lines, "bad"), *shown, *_poses(part), *_provenance(part))
+        return Account(part, badge, (), "", Chapter(anchor, part.name, blocks, badge))
+    verdict, figures = verdict_words(record, part), _Figures(values["deviation"])
     judged = part.verdict is not None
-    return Account(
-        **shared,
-        failed=False,
-        badge=verdict.short if judged else "measured",
-        badge_kind=verdict.kind,
-        verdict=verdict.words if judged else "",
-        row=figures.row(),
-        shares=_shares(values["verdict"]),
-        tiles=figures.tiles(part),
-        statistics=figures.statistics(record, part),
-        alignment=alignment_rows(part),
-        motions=motions(first) if first else [],
-        origin=", ".join(number(float(x), 2) for x in first.origin) if first else "",
-        free=tuple(dict.fromkeys(free.words for each in part.alignments for free in each.free)),
-        hidden=part.hidden,
-        labels=[_label(each) for each in readings(record.nominal.mesh, part, record.recipe.report.labels)],
-        uncertainty=contributions(record, part),
+    badge = Badge(verdict.short, verdict.kind) if judged else Badge("measured", "none")
+    blocks = (
+        Paragraph(f"{part.status.words} {part.reason}".strip()),
+        *([Paragraph(verdict.words, "Verdict.")] if judged else []),
+        *_shares(values["verdict"]),
+        Tiles(tuple(figures.tiles(part))),
+        *shown,
+        *_labels(readings(record.nominal.mesh, part, record.recipe.report.labels)),
+        *_statistics(record, part, figures),
+        *_poses(part),
+        *_pose_uncertainty(part),
+        *_hidden(part),
+        *_budget(record, part),
+        *_provenance(part),
     )
+    words = verdict.words if judged else ""
+    return Account(part, badge, tuple(figures.row()), words, Chapter(anchor, part.name, blocks, badge))
 
 
 @dataclass(frozen=True)
@@ -197,18 +156,78 @@ def _extreme(part: MeasuredPart, position: Any) -> str:
     return measured(float(part.deviation.value[node]), float(part.deviation.sigma[node]))
 
 
-def _shares(verdict: Mapping[str, float] | None) -> list[Share]:
+def _shares(verdict: Mapping[str, float] | None) -> list[Block]:
     if verdict is None:
         return []
-    return [
-        Share(f"{100 * share:.3f}", f"rgb{colour}", f"{name} {number(100 * share, 1)} %")
+    shares = [
+        Share(100 * share, colour, f"{name} {number(100 * share, 1)} %")
         for (name, share), colour in zip(verdict.items(), SHARE_COLOURS, strict=True)
+    ]
+    return [Shares(tuple(shares))]
+
+
+def _labels(found: Sequence[Reading]) -> list[Block]:
+    if not found:
+        return []
+    head = ("Name", "Point, mm", "Deviation ± U (k = 2)", "Verdict", "Distance to the node read")
+    rows = tuple(_label(each) for each in found)
+    return [Heading("Named points"), Table(head, rows, ("name", "text", "number", "text", "number"))]
+
+
+def _label(reading: Reading) -> tuple[str, ...]:
+    point = ", ".join(number(float(x), 2) for x in reading.asked)
+    if reading.node is None:
+        return (reading.name, point, "not measured", "–", "–")
+    value = measured(reading.value, reading.sigma)
+    return (reading.name, point, value, VERDICTS[reading.verdict], f"{number(reading.distance, 2)} mm")
+
+
+def _statistics(record: Record, part: MeasuredPart, figures: _Figures) -> list[Block]:
+    statistics = (Heading("Statistics of the deviation"), table_of(figures.statistics(record, part)))
+    rows = alignment_rows(part)
+    blocks: list[Block] = [Beside(statistics, (Heading("Alignment"), table_of(rows)))] if rows else list(statistics)
+    words = "The points do not determine it; it was held where the alignment started, and its covariance is zero."
+    free = dict.fromkeys(free.words for each in part.alignments for free in each.free)
+    return blocks + [Note("Free motion:", (f"{motion}. {words}",)) for motion in free]
+
+
+def _poses(part: MeasuredPart) -> list[Block]:
+    failed = not part.status.has_map
+    return [
+        Folded(pose.title, (*([Paragraph(pose.words)] if pose.words else []), Code(pose.matrix)), failed)
+        for pose in poses(part)
     ]
 
 
-def _label(reading: Reading) -> LabelWords:
-    point = ", ".join(number(float(x), 2) for x in reading.asked)
-    if reading.node is None:
-        return LabelWords(reading.name, point, "not measured", "–", "–")
-    value = measured(reading.value, reading.sigma)
-    return LabelWords(reading.name, point, value, VERDICTS[reading.verdict], f"{number(reading.distance, 2)} mm")
+def _pose_uncertainty(part: MeasuredPart) -> list[Block]:
+    if not part.alignments:
+        return []
+    first = part.alignments[0]
+    origin = ", ".join(number(float(x), 2) for x in first.origin)
+    words = f"Standard uncertainties of a small motion applied after the alignment, about ({origin}) mm."
+    return [Folded("Uncertainty of the pose", (Paragraph(words), table_of(motions(first))))]
+
+
+def _hidden(part: MeasuredPart) -> list[Block]:
+    if not part.hidden:
+        return []
+    words = (
+        "A change of the cameras makes up for these motions of the surface. Those without a size are taken out of the "
+        "map; the others are in its uncertainty."
+    )
+    return [Heading("What the pictures cannot tell"), Paragraph(words), Bullets(part.hidden)]
+
+
+def _budget(record: Record, part: MeasuredPart) -> list[Block]:
+    found = contributions(record, part)
+    if not found:
+        return []
+    rows = tuple((each.source, each.figure, each.words) for each in found)
+    table = Table(("Source", "Size", "How it enters"), rows, ("text", "figure", "text"))
+    return [Heading("Uncertainty"), table]
+
+
+def _provenance(part: MeasuredPart) -> list[Block]:
+    seconds = " · ".join(f"{stage} {number(seconds, 2)} s" for stage, seconds in part.seconds.items())
+    blocks: list[Block] = [Heading("How it was measured"), Code(part.provenance)]
+    return blocks + ([Paragraph(seconds)] if seconds else [])

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inspect3d.report.fonts import installed
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 INK = "#1d2127"
 PALE = "#5d6570"
-FONTS = ("DejaVu Sans", "Noto Sans CJK SC", "Noto Sans CJK JP", "Source Han Sans", "WenQuanYi Micro Hei",
-         "Microsoft YaHei", "PingFang SC", "Hiragino Sans", "Malgun Gothic", "Arial Unicode MS")  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Canvas:
     def text(self, x: float, y: float, words: str, size: float, **style: Any) -> None:
         """Write words as they are, whatever characters they hold; size in px of a 1600 x 1200 sheet."""
         style = {"color": INK, "va": "center", "ha": "left"} | style
-        self.axes.text(x, y, words, fontsize=size * self.unit * 0.72, parse_math=False, family=_fonts(), **style)
+        self.axes.text(x, y, words, fontsize=size * self.unit * 0.72, parse_math=False, family=installed(), **style)
 
     def fitted(self, x: float, y: float, words: str, size: float, width: float, **style: Any) -> None:
         """Write words, cut with an ellipsis where they are wider than asked."""
@@ -77,7 +77,7 @@ class Canvas:
 
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message=r"Glyph .* missing", category=UserWarning)
-            properties = FontProperties(family=_fonts(), weight=weight, size=size * self.unit)
+            properties = FontProperties(family=installed(), weight=weight, size=size * self.unit)
             width, _, _ = text_to_path.get_text_width_height_descent(words, properties, ismath=False)
         return float(width)
 
@@ -99,10 +99,3 @@ class Canvas:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message=r"Glyph .* missing", category=UserWarning)
             self.figure.savefig(file, format="png", dpi=100, metadata={"Software": "inspect3d"})
-
-
-def _fonts() -> list[str]:
-    from matplotlib.font_manager import fontManager
-
-    installed = {entry.name for entry in fontManager.ttflist}
-    return [font for font in FONTS if font in installed]

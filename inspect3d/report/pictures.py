@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -65,6 +66,12 @@ def draw_pictures(record: Record, folder: Path, progress: Progress) -> dict[str,
         shown[part.name] = tuple(_draw_measurement(record, part, folder, views))
     progress.update(1.0)
     return shown
+
+
+def start(shown: Mapping[str, tuple[Shown, ...]]) -> Viewpoint:
+    """Return the viewpoint of the first picture of a measurement."""
+    found = (each.viewpoint for name, pictures in shown.items() if name for each in pictures if each.viewpoint)
+    return next(found, Viewpoint.of("iso"))
 
 
 def map_scale(record: Record, part: MeasuredPart) -> ColourScale:

@@ -25,13 +25,17 @@ from inspect3d.report.viewpoint import Viewpoint
 
 
 def viewer_data(record: Record, start: Viewpoint) -> str:
-    """Return the maps as JSON that can stand in a script element: no character in it can end the element.
+    """Return the maps as JSON that can stand in a script element: no character in it can end the element;
+    empty where there is no map.
 
     Parameters
     ----------
     record : the inspection
     start : the viewpoint at the beginning
     """
+    with_map = [part for part in record.parts if part.status.has_map and part.deviation is not None]
+    if not with_map:
+        return ""
     mesh = record.nominal.mesh
     centre = (mesh.nodes.min(axis=0) + mesh.nodes.max(axis=0)) / 2
     data = {
@@ -44,7 +48,7 @@ def viewer_data(record: Record, start: Viewpoint) -> str:
         "crease": _packed(mesh.crease, np.uint8),
         "unmeasured": list(UNMEASURED),
         "back": list(BACK),
-        "maps": [_map(record, part) for part in record.parts if part.status.has_map and part.deviation is not None],
+        "maps": [_map(record, part) for part in with_map],
     }
     return json.dumps(data, ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
 

@@ -7,16 +7,19 @@ from pathlib import Path
 
 from inspect3d.progress import Progress
 from inspect3d.record import Record
+from inspect3d.report.document import document
 from inspect3d.report.maps import cloud_polydata, map_polydata
 from inspect3d.report.page import page
-from inspect3d.report.pictures import draw_pictures
+from inspect3d.report.pdf import pdf
+from inspect3d.report.pictures import draw_pictures, start
 from inspect3d.report.results import as_json, results
+from inspect3d.report.viewer import viewer_data
 
 
 def write_report(
     record: Record, folder: Path, progress: Progress | None = None, moment: datetime | None = None
 ) -> None:
-    """Write results.json, the maps and clouds (.vtp), the pictures and report.html.
+    """Write results.json, the maps and clouds (.vtp), the pictures and the report.
 
     Parameters
     ----------
@@ -37,5 +40,9 @@ def write_report(
     pictures = folder / "pictures"
     pictures.mkdir(exist_ok=True)
     shown = draw_pictures(record, pictures, progress)
-    html = page(record, values, shown, pictures, moment or datetime.now().astimezone())
+    moment = moment or datetime.now().astimezone()
+    report = document(record, values, shown, moment)
+    html = page(report, pictures, viewer_data(record, start(shown)))
     (folder / "report.html").write_text(html, encoding="utf-8")
+    if "pdf" in record.recipe.report.formats:
+        (folder / "report.pdf").write_bytes(pdf(report, folder, moment))

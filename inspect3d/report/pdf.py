@@ -1,0 +1,51 @@
+"""The report as a PDF."""
+
+from __future__ import annotations
+
+import json
+from datetime import datetime
+from pathlib import Path
+
+from inspect3d.report.blocks import Document, as_data
+from inspect3d.report.fonts import FAMILIES, MONO, font_folder, unprintable
+from inspect3d.report.page import asset
+
+
+def pdf(document: Document, folder: Path, moment: datetime) -> bytes:
+    """Return the report as PDF, A4: the same document, pictures and moment give the same bytes on a machine.
+
+    What the document says reaches typst as strings of a JSON text, so nothing in it can be markup.
+
+    Parameters
+    ----------
+    document : the report
+    folder : holds the folder `pictures`
+    moment : the date in the file's own description
+    """
+    import typst
+
+    data = as_data(document)
+    words = json.dumps(data, ensure_ascii=False)
+    missing = unprintable(words)
+    content = {"document": data, "fonts": FAMILIES, "mono": MONO, "note": _note(missing)}
+    compiler = typst.Compiler(
+        asset("report.typ").encode(),
+        root=folder,
+        font_paths=typst.Fonts(font_paths=[font_folder()]),
+        sys_inputs={"content": json.dumps(content, ensure_ascii=False)},
+    )
+    made = compiler.compile(format="pdf", timestamp=moment)
+    if not isinstance(made, bytes):
+        raise TypeError("typst wrote no single PDF")
+    return made
+
+
+def _note(missing: str) -> str:
+    if not missing:
+        return ""
+    codes = ", ".join(f"U+{ord(character):04X}" for character in missing[:12])
+    more = f" and {len(missing) - 12} more" if len(missing) > 12 else ""
+    return (
+        f"This computer has no font for some characters ({codes}{more}), which show as boxes here; the HTML report has "
+        "them. Install a font that does, such as Noto Sans CJK (Debian: fonts-noto-cjk), and write the report again."
+    )
