@@ -60,6 +60,8 @@ HEAVY = {
     "trimesh",
     "cv2",
     "matplotlib",
+    "typst",
+    "pyarrow",
 }
 
 

@@ -12,14 +12,16 @@ from inspect3d.report.maps import cloud_polydata, map_polydata
 from inspect3d.report.page import page
 from inspect3d.report.pdf import pdf
 from inspect3d.report.pictures import draw_pictures, start
+from inspect3d.report.qif import qif
 from inspect3d.report.results import as_json, results
+from inspect3d.report.tables import write_tables
 from inspect3d.report.viewer import viewer_data
 
 
 def write_report(
     record: Record, folder: Path, progress: Progress | None = None, moment: datetime | None = None
 ) -> None:
-    """Write results.json, the maps and clouds (.vtp), the pictures and the report.
+    """Write results.json and .qif, the maps (.vtp, .csv, .parquet) and clouds (.vtp), the pictures and the report.
 
     Parameters
     ----------
@@ -28,19 +30,20 @@ def write_report(
     progress : told how far the report is
     moment : the date on the report; default: now
     """
-    progress = progress or Progress()
+    progress, moment = progress or Progress(), moment or datetime.now().astimezone()
     values = results(record)
     (folder / "results.json").write_text(as_json(values), encoding="utf-8")
     for part in record.parts:
         if not part.status.has_map or part.deviation is None:
             continue
         map_polydata(record.nominal.mesh, part).save(folder / f"{part.name}.vtp")
+        write_tables(record, part, folder)
         if part.points_cad is not None and part.point_deviation is not None:
             cloud_polydata(part).save(folder / f"{part.name}_points.vtp")
     pictures = folder / "pictures"
     pictures.mkdir(exist_ok=True)
     shown = draw_pictures(record, pictures, progress)
-    moment = moment or datetime.now().astimezone()
+    (folder / "results.qif").write_bytes(qif(record, moment))
     report = document(record, values, shown, moment)
     html = page(report, pictures, viewer_data(record, start(shown)))
     (folder / "report.html").write_text(html, encoding="utf-8")
