@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from inspect3d.arrays import Floats, Integers
+from inspect3d.compare.difference_covariance import DifferenceCovariance
 from inspect3d.compare.measured_map import MeasuredMap
-from inspect3d.deviate.map_covariance import Selected, variances_without
+from inspect3d.deviate.map_covariance import Selected
 from inspect3d.nominal.nominal import InspectionMesh
 from inspect3d.register.gauge import best_fit
 
@@ -31,22 +32,20 @@ class CommonGauge:
     words: str
 
     def __call__(self, values: Floats) -> Floats:
-        """Return G v of a map (k,) mm."""
+        """Return G v of maps (k,) or (k, m) mm."""
         return values - self.modes @ (self.solver @ values)
 
-    def variances(self, a: MeasuredMap, b: MeasuredMap, at: Integers) -> Floats:
-        """Return the variance of the difference at the common nodes `at` (k,), mm²."""
-        return self._of(a, at) + self._of(b, at)
-
-    def _of(self, one: MeasuredMap, at: Integers) -> Floats:
-        covariance = one.covariance
-        rows = np.searchsorted(covariance.node, at)
-        found = variances_without(Selected(covariance.own, rows), self.modes, self.solver)
-        pose = covariance.pose[rows]
-        found = found + ((pose - self.modes @ (self.solver @ pose)) ** 2).sum(axis=1)
-        if not self.same_coat:
-            found = found + self(np.full(len(at), covariance.coating[1])) ** 2
-        return found + covariance.calibration**2
+    def covariance(self, a: MeasuredMap, b: MeasuredMap, at: Integers) -> DifferenceCovariance:
+        """Return the covariance of the difference at the common nodes `at` (k,)."""
+        own, shared = [], []
+        for covariance in (a.covariance, b.covariance):
+            rows = np.searchsorted(covariance.node, at)
+            own.append(Selected(covariance.own, rows))
+            shared.append(self(covariance.pose[rows]))
+            if not self.same_coat:
+                shared.append(self(np.full((len(at), 1), covariance.coating[1])))
+            shared.append(np.full((len(at), 1), covariance.calibration))
+        return DifferenceCovariance((own[0], own[1]), self.modes, self.solver, np.concatenate(shared, axis=1))
 
 
 def common_gauge(a: MeasuredMap, b: MeasuredMap, mesh: InspectionMesh, at: Integers) -> CommonGauge:

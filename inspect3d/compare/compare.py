@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
-from inspect3d.arrays import Floats
+from inspect3d.arrays import Floats, Integers
 from inspect3d.compare.agreement_words import agreement_words
 from inspect3d.compare.common_gauge import CommonGauge, common_gauge
 from inspect3d.compare.comparison import Comparison
 from inspect3d.compare.measured_map import MeasuredMap
+from inspect3d.compare.region_test import RegionTest
 from inspect3d.deviate.statistics import Statistics
+from inspect3d.measure import FieldCovariance
 from inspect3d.nominal.nominal import InspectionMesh
 
 AGREEMENT = 1.96  # standard deviations either side of the mean that hold 95 % of normal differences
@@ -21,7 +24,14 @@ LEAST_NODES = 12  # fewer common nodes are no comparison
 
 @dataclass(frozen=True)
 class Compare:
-    """Bring maps into one alignment, two at a time, and compare them node by node."""
+    """Bring maps into one alignment, two at a time, and compare them node by node and by regions.
+
+    Parameters
+    ----------
+    test : finds the regions in which two maps differ beyond doubt
+    """
+
+    test: RegionTest = field(default_factory=RegionTest)
 
     def __call__(self, maps: tuple[MeasuredMap, ...], mesh: InspectionMesh) -> tuple[Comparison, ...]:
         """Return the comparison of every pair of maps on a mesh, in their order."""
@@ -35,27 +45,37 @@ class Compare:
             return _apart(a, b, mesh)
         gauge = common_gauge(a, b, mesh, at)
         value_a, value_b = gauge(a.deviation.value[at]), gauge(b.deviation.value[at])
-        areas = mesh.areas[at]
-        figures = Statistics.of(value_a - value_b, areas)
+        difference, areas = value_a - value_b, mesh.areas[at]
+        figures = Statistics.of(difference, areas)
         reason = _not_independent(a, b)
-        sigma = None if reason else np.sqrt(gauge.variances(a, b, at))
         found = replace(
             _apart(a, b, mesh),
             common=common,
-            difference=_spread(value_a - value_b, at, len(mesh)),
+            difference=_spread(difference, at, len(mesh)),
             average=_spread((value_a + value_b) / 2, at, len(mesh)),
-            sigma=None if sigma is None else _spread(sigma, at, len(mesh)),
             reason=reason,
             mean=figures.mean,
             std=figures.std,
             limits_of_agreement=(figures.mean - AGREEMENT * figures.std, figures.mean + AGREEMENT * figures.std),
             correlation=_correlation(value_a, value_b, areas),
             gauge=gauge.words,
+            **({} if reason else self._weighed(difference, gauge.covariance(a, b, at), mesh, at)),
         )
-        if found.en is not None:
-            en = found.en[at]
-            found = replace(found, en_rms=float(np.sqrt(np.mean(en**2))), en_above_1=float(np.mean(en > 1)))
         return replace(found, words=agreement_words(found, _remarks(a, b, gauge)))
+
+    def _weighed(
+        self, difference: Floats, covariance: FieldCovariance, mesh: InspectionMesh, at: Integers
+    ) -> dict[str, Any]:
+        """Return what the uncertainty of the difference at the common nodes `at` (k,) adds to a comparison."""
+        sigma = np.sqrt(covariance.variances)
+        en = np.abs(difference) / (2 * sigma)
+        regions = self.test(difference, covariance, mesh.nodes[at], mesh.normals[at], mesh.areas[at])
+        return {
+            "sigma": _spread(sigma, at, len(mesh)),
+            "en_rms": float(np.sqrt(np.mean(en**2))),
+            "en_above_1": float(np.mean(en > 1)),
+            "regions": tuple(replace(region, nodes=at[region.nodes]) for region in regions),
+        }
 
 
 def _apart(a: MeasuredMap, b: MeasuredMap, mesh: InspectionMesh) -> Comparison:
@@ -112,7 +132,7 @@ def _remarks(a: MeasuredMap, b: MeasuredMap, gauge: CommonGauge) -> tuple[str, .
     return tuple(remarks)
 
 
-def _spread(values: Floats, at: np.ndarray, n: int) -> Floats:
+def _spread(values: Floats, at: Integers, n: int) -> Floats:
     spread = np.full(n, np.nan)
     spread[at] = values
     return spread
