@@ -21,8 +21,9 @@ from inspect3d.progress import Progress
 from inspect3d.recipe import Budget, Coating, MeasurementTable, Recipe, Start
 from inspect3d.record import MeasuredPart
 from inspect3d.register.alignment import Alignment, NoAlignmentError
-from inspect3d.register.landmarks import landmark_covariance, pose_from_landmarks
+from inspect3d.register.landmarks import landmark_covariance, similarity_from_landmarks
 from inspect3d.register.register import Register
+from inspect3d.register.similarity import Similarity
 
 REFERENCE = 20.0  # degC at which dimensions hold (ISO 1)
 BARE = Coating(thickness=0.0)
@@ -57,26 +58,32 @@ def measured(job: Job, recipe: Recipe, nominal: Nominal, progress: Progress) -> 
 
 def _registered(measurement: Measurement, table: MeasurementTable, nominal: Nominal) -> tuple[Alignment, ...]:
     start = _start(table.alignment, measurement)
-    register = Register(nominal, start, table.alignment.refine, table.reach)
+    register = Register(nominal, start, table.alignment.refine, table.reach, measurement.scale_known)
     alignments = tuple(register(cloud) for cloud in measurement.clouds)
     if table.alignment.start == "landmarks" and not table.alignment.refine:
         cad = np.array([mark.cad for mark in table.alignment.landmarks])
         measured = np.array([mark.measured for mark in table.alignment.landmarks])
-        return tuple(replace(a, covariance=landmark_covariance(measured, cad, a.origin)) for a in alignments)
+        grows = not measurement.scale_known
+        return tuple(replace(a, covariance=landmark_covariance(measured, cad, a.origin, grows)) for a in alignments)
     return alignments
 
 
-def _start(alignment: Start, measurement: Measurement) -> Pose | None:
+def _start(alignment: Start, measurement: Measurement) -> Similarity | None:
     """Return the pose the alignment begins with, or None to search for it."""
     if alignment.start == "landmarks":
-        return pose_from_landmarks(
+        return similarity_from_landmarks(
             np.array([mark.measured for mark in alignment.landmarks]),
             np.array([mark.cad for mark in alignment.landmarks]),
+            grows=not measurement.scale_known,
+        )
+    if alignment.start in ("identity", "pose") and not measurement.scale_known:
+        raise MeasurementError(
+            f'The points have no scale, and start = "{alignment.start}" gives them none: use "auto" or "landmarks".'
         )
     if alignment.matrix is not None:
-        return Pose.from_matrix(np.array(alignment.matrix))
+        return Similarity(Pose.from_matrix(np.array(alignment.matrix)))
     if alignment.start == "identity" or measurement.frame == "cad":
-        return Pose.identity()
+        return Similarity.identity()
     return None
 
 
@@ -100,6 +107,7 @@ def _of_clouds(
             coating=coating.thickness,
             coating_sigma=coating.sigma,
             calibration=recipe.report.budget.calibration,
+            scale_known=measurement.scale_known,
         )
         found = deviate(measurement.clouds, alignments, nominal, _counted(recipe, nominal))
     return replace(

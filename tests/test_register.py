@@ -191,10 +191,10 @@ feet = centres * [1, 1, 0]
 normals = np.broadcast_to([0.0, 0.0, 1.0], feet.shape).copy()
 points = random.uniform(-1, 1, (40, 3)) * [1, 1, 0]
 none = np.zeros_like(points)
-rotations, translations = np.eye(3)[None].copy(), np.array([[0.0, 0.0, 0.3]])
+rotations, translations, sizes = np.eye(3)[None].copy(), np.array([[0.0, 0.0, 0.3]]), np.ones(1)
 grid = (np.full(3, -2.0), 0.5, feet, normals)
-before = costs(rotations, translations, points, none, False, 1.0, *grid)[0]
-descend(rotations, translations, points, none, False, np.full(10, 1.0), points.mean(axis=0), 1.0, *grid)
+before = costs(rotations, translations, sizes, points, none, False, 1.0, *grid)[0]
+descend(rotations, translations, sizes, False, points, none, False, np.full(10, 1.0), points.mean(axis=0), 1.0, *grid)
 print(f"{before:.12f} {translations[0, 2]:.12f}")
 assert abs(before - 0.3) < 1e-12 and abs(translations[0, 2]) < 1e-6
 """

@@ -14,11 +14,11 @@ from inspect3d.measure import Cloud
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.nominal.surface import Feet
 from inspect3d.outcome import MeasurementError
-from inspect3d.pose import Pose
 from inspect3d.register.alignment import Alignment
 from inspect3d.register.gauge import Gauge, best_fit
 from inspect3d.register.icp import TUKEY, median_and_scale
 from inspect3d.register.mobility import jacobian
+from inspect3d.register.similarity import Similarity
 
 FOREIGN = 0.02  # share of the CAD's diagonal beyond which a point is foreign, unless the recipe gives a reach
 SETTLED = 0.02  # share of the usual uncertainty below which the last motion of a node ends the alignment
@@ -53,9 +53,10 @@ class CloudDeviation:
 class Deviate:
     """Measure the deviation of clouds at the nodes, and bring it into the common alignment.
 
-    The common alignment is the robust best fit of the map itself, weighted by area (`Gauge`): the rigid motion found in
-    the map moves the points, until none is left. The map's uncertainty is that of the local fits through the same
-    linear map, G S G'; what all nodes share (coating, calibration, chord of the tessellation) is added.
+    The common alignment is the robust best fit of the map itself, weighted by area (`Gauge`): the rigid motion found
+    in the map, and the growth where the method cannot see the scale, moves the points, until none is left. The map's
+    uncertainty is that of the local fits through the same linear map, G S G'; what all nodes share (coating,
+    calibration, chord of the tessellation) is added.
 
     Parameters
     ----------
@@ -64,6 +65,7 @@ class Deviate:
     reach : mm, points farther than this from the CAD are foreign; None: 2 % of the CAD's diagonal
     coating : mm, thickness of paint, subtracted
     coating_sigma, calibration : mm, standard uncertainties that all nodes share
+    scale_known : False takes the growth of the part out of the map as well
     steps : of the alignment at the most
     """
 
@@ -73,6 +75,7 @@ class Deviate:
     coating: float = 0.0
     coating_sigma: float = 0.0
     calibration: float = 0.0
+    scale_known: bool = True
     steps: int = 6
 
     def __call__(
@@ -94,20 +97,20 @@ class Deviate:
         mesh = nominal.mesh
         points = np.concatenate([place(cloud.points) for cloud, place in zip(clouds, alignments, strict=True)])
         normals = _normals(clouds, alignments)
-        noise = _common_noise(clouds)
-        moved = Pose.identity()
+        noise = _common_noise(clouds, alignments)
+        moved = Similarity.identity()
         for _ in range(self.steps):
             feet = nominal.surface.closest(moved(points))
             fit = self._observe(nominal, feet, moved.turned(normals), noise, counted)
             seen = np.flatnonzero(fit.observed)
             value = fit.value[seen] - self.coating
-            gauge = best_fit(mesh.nodes[seen], mesh.normals[seen], mesh.areas[seen], value)
+            gauge = best_fit(mesh.nodes[seen], mesh.normals[seen], mesh.areas[seen], value, not self.scale_known)
             if not self.refine:
                 break
             motion = gauge.motion(value)
             if np.abs(gauge.jacobian @ motion).max() < SETTLED * np.sqrt(np.median(fit.variance[seen])):
                 break
-            moved = Pose.small(motion, gauge.origin) @ moved
+            moved = Similarity.small(motion, gauge.origin) @ moved
         deviation = self._map(fit, value, gauge, alignments, nominal)
         covariance = self._covariance(fit, gauge, alignments)
         distance = np.where(feet.on_rim, np.nan, feet.distance - self.coating)
@@ -181,7 +184,7 @@ class Deviate:
         )
 
     def _aligned(
-        self, alignments: tuple[Alignment, ...], moved: Pose, clouds: tuple[Cloud, ...], distance: Floats
+        self, alignments: tuple[Alignment, ...], moved: Similarity, clouds: tuple[Cloud, ...], distance: Floats
     ) -> tuple[Alignment, ...]:
         """Return the alignments with the last motion in them, and what the points say about it."""
         ends = np.cumsum([len(cloud) for cloud in clouds])
@@ -191,8 +194,10 @@ class Deviate:
             middle, scale = median_and_scale(own[np.isfinite(own)])
             used = np.isfinite(own) & (np.abs(own - middle) < TUKEY * max(scale, 1e-12))
             _, residual = median_and_scale(own[used])
-            pose = moved @ alignment.cad_from_measured
-            result.append(replace(alignment, cad_from_measured=pose, residual=residual, used=used))
+            placed = moved @ Similarity(alignment.cad_from_measured, alignment.scale)
+            result.append(
+                replace(alignment, cad_from_measured=placed.pose, scale=placed.scale, residual=residual, used=used)
+            )
         return tuple(result)
 
 
@@ -206,6 +211,9 @@ def _normals(clouds: tuple[Cloud, ...], alignments: tuple[Alignment, ...]) -> Fl
     )
 
 
-def _common_noise(clouds: tuple[Cloud, ...]) -> float | None:
-    told = [cloud.noise for cloud in clouds if cloud.noise is not None]
+def _common_noise(clouds: tuple[Cloud, ...], alignments: tuple[Alignment, ...]) -> float | None:
+    """Return the noise of a point in the CAD frame, mm, the largest of the clouds; None where one does not tell it."""
+    told = [
+        cloud.noise * place.scale for cloud, place in zip(clouds, alignments, strict=True) if cloud.noise is not None
+    ]
     return max(told) if len(told) == len(clouds) else None

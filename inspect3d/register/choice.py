@@ -36,12 +36,13 @@ class Choice:
     by_symmetry: bool
 
 
-def choose(fits: list[Fit], smooth: Smooth, points: Floats) -> Choice:
+def choose(fits: list[Fit], smooth: Smooth, points: Floats, grows: bool = False) -> Choice:
     """Return what the data say about fits of the same points (n, 3) mm.
 
     Costs are compared point by point, in blocks of space, since neighbouring errors correlate: a fit is ruled out when
     its cost is higher by three standard errors. Of those left, two are the same answer if the motion between them
-    brings the CAD onto itself, or if both leave motions free and lie on the same smooth faces.
+    brings the CAD onto itself, or if both leave motions free and lie on the same smooth faces. Where the cloud `grows`,
+    its growth is one of the motions.
     """
     surface = smooth.surface
     width = max(3 * min(fit.scale for fit in fits), 2e-3 * surface.diagonal)
@@ -59,7 +60,7 @@ def choose(fits: list[Fit], smooth: Smooth, points: Floats) -> Choice:
         if is_symmetry(surface, motion):
             equivalent.append(fit)
             by_symmetry = True
-        elif _same_up_to_free_motions(best, fit, smooth):
+        elif _same_up_to_free_motions(best, fit, smooth, grows):
             equivalent.append(fit)
         else:
             rivals.append(fit)
@@ -67,20 +68,21 @@ def choose(fits: list[Fit], smooth: Smooth, points: Floats) -> Choice:
     return Choice(equivalent[0], tuple(equivalent), tuple(rivals), tuple(others), by_symmetry)
 
 
-def free_in(fit: Fit, smooth: Smooth) -> Floats:
-    """Return the free motions (k, 6) of a fit, about the centre of its points; all where no point is near."""
-    width = 3 * fit.scale + 1e-3 * smooth.surface.diagonal
+def freedom(fit: Fit, smooth: Smooth, grows: bool = False) -> int:
+    """Return how many motions a fit leaves free, growth among them if the cloud `grows`; all where no point is near."""
+    width = (3 * fit.scale + 1e-3 * smooth.surface.diagonal) * fit.pose.scale
     part = fit.agrees & ~fit.feet.on_rim & (np.abs(fit.feet.distance) < width)
     if np.count_nonzero(part) < 6:
-        return np.eye(6)
+        return 6 + grows
     feet = fit.feet.points[part]
     normals = smooth.normals(feet, fit.feet.triangle[part])
-    return Gauge(feet, normals, np.ones(len(feet))).free
+    gauge = Gauge(feet, normals, np.ones(len(feet)), growth=grows)
+    return len(gauge.free) + gauge.growth_is_free
 
 
-def _same_up_to_free_motions(one: Fit, other: Fit, smooth: Smooth) -> bool:
-    count = len(free_in(one, smooth))
-    if count == 0 or len(free_in(other, smooth)) != count:
+def _same_up_to_free_motions(one: Fit, other: Fit, smooth: Smooth, grows: bool) -> bool:
+    count = freedom(one, smooth, grows)
+    if count == 0 or freedom(other, smooth, grows) != count:
         return False
     patches = smooth.patches
     return bool(np.mean(patches[one.feet.triangle] == patches[other.feet.triangle]) > 0.9)

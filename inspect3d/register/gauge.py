@@ -13,6 +13,7 @@ from inspect3d.register.mobility import jacobian, spread
 MAD = 1.4826
 TUKEY = 4.685
 FREE = 1e-3  # share of the stiffest motion's stiffness below which a motion is free
+SHAPELESS = 1e-5  # the same for the growth, which a slight curvature determines well enough
 SOFT = 1e-2  # share of the stiffest motion's stiffness below which a motion is soft
 ROUNDED = 1e-9  # share of a variance below which a difference of variances is rounding
 OFFSET = 3.0  # robust scales that a uniform deviation must have to count as one
@@ -88,13 +89,24 @@ class Gauge:
         return vectors[:, values < FREE * values[-1]].T
 
     @cached_property
+    def growth_is_free(self) -> bool:
+        """Tell whether the growth changes no deviation that a motion does not change alike, as on planes through one
+        point; always False without growth."""
+        if not self.growth:
+            return False
+        values, _ = self._spectrum
+        return bool(values[len(self.free)] < SHAPELESS * values[-1])
+
+    @cached_property
     def inverse(self) -> Floats:
         """Return (J' W J)⁺, (6, 6) or with growth (7, 7), with the free directions left out."""
-        return self._inverse(FREE)
+        return self._inverse(0.0)
 
     def _inverse(self, least: float) -> Floats:
+        """Return it without the free motions and those whose share of the stiffest motion's stiffness is less."""
         values, vectors = self._spectrum
         stiff = values >= least * values[-1]
+        stiff[: len(self.free) + self.growth_is_free] = False
         return (vectors[:, stiff] / values[stiff]) @ vectors[:, stiff].T
 
     @cached_property

@@ -6,11 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inspect3d.arrays import Floats, unit
+from inspect3d.arrays import Booleans, Floats, unit
 from inspect3d.nominal.surface import Surface
 from inspect3d.pose import Pose
 from inspect3d.register.field import Field
+from inspect3d.register.similarity import Similarity
 from inspect3d.register.thinned import Thinned
+
+AT_ONCE = 80_000  # guesses, so that they fit into memory
+MARGIN = 1.2  # by which a scale may leave its bounds in the descent
 
 
 @dataclass(frozen=True)
@@ -20,11 +24,14 @@ class PoseSearch:
     A guess puts one measured point with its normal onto a random point of the surface and turns it about the normal at
     random. Guesses are ranked by the share of the other points that come to lie near the surface with a fitting
     normal; the best descend by truncated point-to-plane steps on the `Field`, and those that arrive at the same pose
-    are counted once. Distances are shares of the CAD's diagonal.
+    are counted once. Distances are shares of the CAD's diagonal, at the size of the cloud.
+
+    Where the scale is unknown, each guess draws one as well, and the descent improves it.
 
     Parameters
     ----------
     guesses : tried in all
+    scales : least and largest scale that is tried; None: the scale is known
     kept : that descend
     judges : points a guess is judged by
     near : distance within which a point counts while guesses are ranked
@@ -34,6 +41,7 @@ class PoseSearch:
     """
 
     guesses: int = 80_000
+    scales: tuple[float, float] | None = None
     kept: int = 400
     judges: int = 100
     near: float = 0.05
@@ -42,7 +50,7 @@ class PoseSearch:
     apart: float = 0.03
     seed: int = 0
 
-    def __call__(self, cloud: Thinned, surface: Surface, field: Field) -> list[Pose]:
+    def __call__(self, cloud: Thinned, surface: Surface, field: Field) -> list[Similarity]:
         """Return the poses cad_from_cloud found, best first."""
         from inspect3d.register.search_kernel import costs, descend
 
@@ -50,39 +58,52 @@ class PoseSearch:
         size = surface.diagonal
         grid = (field.origin, field.step, field.feet, field.normals)
         judges = random.permutation(len(cloud.points))[: self.judges]
-        rotations, translations = self._guess(cloud, surface, random)
-        rank = costs(
-            rotations,
-            translations,
-            cloud.points[judges],
-            cloud.normals[judges],
-            cloud.oriented,
-            self.near * size,
-            *grid,
-        )
+        parts = []
+        for _ in range(0, self.guesses, AT_ONCE):
+            rotations, translations, sizes = self._guess(cloud, surface, min(self.guesses, AT_ONCE), random)
+            rank = costs(
+                rotations, translations, sizes, cloud.points[judges], cloud.normals[judges], cloud.oriented,
+                self.near * size, *grid,
+            )  # fmt: skip
+            best = np.argsort(rank)[: self.kept]
+            parts.append((rank[best], rotations[best], translations[best], sizes[best]))
+        rank, rotations, translations, sizes = (np.concatenate(values) for values in zip(*parts, strict=True))
         best = np.argsort(rank)[: self.kept]
-        rotations, translations = rotations[best].copy(), translations[best].copy()
+        rotations, translations, sizes = rotations[best].copy(), translations[best].copy(), sizes[best].copy()
         centre = cloud.points.mean(axis=0)
         length = float(np.sqrt(((cloud.points - centre) ** 2).sum(axis=1).mean()))
         half = random.permutation(len(cloud.points))[:500]
         reaches = np.geomspace(*self.reaches, self.steps) * size
         descend(
-            rotations, translations, cloud.points[half], cloud.normals[half], cloud.oriented, reaches, centre, length,
-            *grid,
+            rotations, translations, sizes, self.scales is not None, cloud.points[half], cloud.normals[half],
+            cloud.oriented, reaches, centre, length, *grid,
         )  # fmt: skip
-        rank = costs(rotations, translations, cloud.points, cloud.normals, cloud.oriented, self.near / 3 * size, *grid)
+        kept = self._within(sizes)
+        rotations, translations, sizes = rotations[kept], translations[kept], sizes[kept]
+        rank = costs(
+            rotations, translations, sizes, cloud.points, cloud.normals, cloud.oriented, self.near / 3 * size, *grid
+        )
         order = np.argsort(rank)
-        poses = [Pose(rotations[k], translations[k]) for k in order]
+        poses = [Similarity(Pose(rotations[k], translations[k]), float(sizes[k])) for k in order]
         return distinct(poses, cloud.points, self.apart * size)
 
-    def _guess(self, cloud: Thinned, surface: Surface, random: np.random.Generator) -> tuple[Floats, Floats]:
-        """Return guesses as rotations (k, 3, 3) and translations (k, 3)."""
+    def _within(self, sizes: Floats) -> Booleans:
+        """Tell which scales lie within the bounds, (k,), or all where none does."""
+        if self.scales is None:
+            return np.ones(len(sizes), bool)
+        within = (sizes > self.scales[0] / MARGIN) & (sizes < self.scales[1] * MARGIN)
+        return within if within.any() else ~within
+
+    def _guess(
+        self, cloud: Thinned, surface: Surface, count: int, random: np.random.Generator
+    ) -> tuple[Floats, Floats, Floats]:
+        """Return guesses as rotations (k, 3, 3), translations (k, 3) and scales (k,)."""
         signed = np.flatnonzero(np.linalg.norm(cloud.normals, axis=1) > 0.5)
         if len(signed) < 10:
             signed = np.arange(len(cloud.points))
-        source = random.choice(signed, self.guesses)
-        triangle = random.choice(len(surface.triangles), self.guesses, p=surface.areas / surface.areas.sum())
-        share = random.random((self.guesses, 2))
+        source = random.choice(signed, count)
+        triangle = random.choice(len(surface.triangles), count, p=surface.areas / surface.areas.sum())
+        share = random.random((count, 2))
         share = np.where(share.sum(axis=1, keepdims=True) > 1, 1 - share, share)
         a, b, c = (surface.vertices[surface.triangles[triangle, k]] for k in range(3))
         target = a + share[:, :1] * (b - a) + share[:, 1:] * (c - a)
@@ -90,28 +111,33 @@ class PoseSearch:
         missing = np.linalg.norm(normal, axis=1) < 0.5
         normal[missing] = unit(random.normal(size=(np.count_nonzero(missing), 3)))
         if not cloud.oriented:
-            normal *= random.choice([-1.0, 1.0], self.guesses)[:, None]
-        frames_cloud = _frames(normal, random.random(self.guesses) * 2 * np.pi)
-        frames_cad = _frames(surface.face_normals[triangle], np.zeros(self.guesses))
+            normal *= random.choice([-1.0, 1.0], count)[:, None]
+        frames_cloud = _frames(normal, random.random(count) * 2 * np.pi)
+        frames_cad = _frames(surface.face_normals[triangle], np.zeros(count))
         rotations = frames_cad @ np.swapaxes(frames_cloud, 1, 2)
-        translations = target - np.einsum("kij,kj->ki", rotations, cloud.points[source])
-        return np.ascontiguousarray(rotations), translations
+        sizes = np.ones(count)
+        if self.scales is not None:
+            low, high = self.scales
+            sizes = low * (high / low) ** random.random(count)
+        translations = target - sizes[:, None] * np.einsum("kij,kj->ki", rotations, cloud.points[source])
+        return np.ascontiguousarray(rotations), translations, sizes
 
 
-def distinct(poses: list[Pose], points: Floats, apart: float) -> list[Pose]:
+def distinct(poses: list[Similarity], points: Floats, apart: float) -> list[Similarity]:
     """Return the poses, in order, that move the points by more than `apart` (rms, mm) from every earlier one."""
     centre = points.mean(axis=0)
     scatter = np.cov((points - centre).T, bias=True)
-    kept: list[Pose] = []
-    rotations = np.empty((0, 3, 3))
+    kept: list[Similarity] = []
+    linears = np.empty((0, 3, 3))
     places = np.empty((0, 3))
     for pose in poses:
         place = pose(centre[None])[0]
-        turned = rotations - pose.rotation
+        linear = pose.matrix[:3, :3]
+        turned = linears - linear
         square = ((places - place) ** 2).sum(axis=1) + np.einsum("kij,jl,kil->k", turned, scatter, turned)
         if (square > apart**2).all():
             kept.append(pose)
-            rotations = np.concatenate([rotations, pose.rotation[None]])
+            linears = np.concatenate([linears, linear[None]])
             places = np.concatenate([places, place[None]])
     return kept
 

@@ -1,6 +1,7 @@
 """Kernels of the pose search: the cost of many poses, and their descent, against the field of a surface.
 
-Arrays only. A pose is a rotation and a translation; poses come in stacks.
+Arrays only. A pose is a rotation, a translation and a size by which the points are multiplied first; poses come in
+stacks. Distances that count, reaches, are mm at the size of the cloud: a cloud does not fit for having shrunk.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from numba import njit, prange
 
 from inspect3d.arrays import Floats
 
+STRIDE = 0.2  # largest relative change of the size in a step
 OPPOSED = 0.3  # normals whose cosine is below this do not belong to the same surface
 
 
@@ -56,6 +58,7 @@ def _apply(rotation: Floats, translation: Floats, point: Floats, moved: Floats) 
 def _cost(
     rotation: Floats,
     translation: Floats,
+    size: float,
     points: Floats,
     point_normals: Floats,
     oriented: bool,
@@ -66,10 +69,11 @@ def _cost(
     normals: Floats,
 ) -> float:
     moved, turned, foot, normal, zero = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.zeros(3)
+    scaled = size * rotation
     cost = 0.0
     for p in range(len(points)):
-        _apply(rotation, translation, points[p], moved)
-        distance = _look_up(moved, origin, step, feet, normals, foot, normal)
+        _apply(scaled, translation, points[p], moved)
+        distance = _look_up(moved, origin, step, feet, normals, foot, normal) / size
         _apply(rotation, zero, point_normals[p], turned)
         if distance < reach and _agrees(turned, normal, oriented):
             cost += distance / reach
@@ -82,6 +86,7 @@ def _cost(
 def costs(
     rotations: Floats,
     translations: Floats,
+    sizes: Floats,
     points: Floats,
     point_normals: Floats,
     oriented: bool,
@@ -95,7 +100,7 @@ def costs(
     result = np.empty(len(rotations))
     for h in prange(len(rotations)):
         result[h] = _cost(
-            rotations[h], translations[h], points, point_normals, oriented, reach, origin, step, feet, normals
+            rotations[h], translations[h], sizes[h], points, point_normals, oriented, reach, origin, step, feet, normals
         )
     return result
 
@@ -142,6 +147,8 @@ def _rotation_of(vector: Floats, rotation: Floats) -> None:
 def _descend(
     rotation: Floats,
     translation: Floats,
+    size: float,
+    grows: bool,
     points: Floats,
     point_normals: Floats,
     oriented: bool,
@@ -152,16 +159,17 @@ def _descend(
     step: float,
     feet: Floats,
     normals: Floats,
-) -> None:
-    """Improve one pose in place: a truncated point-to-plane step for each reach."""
+) -> float:
+    """Improve one pose in place: a truncated point-to-plane step for each reach; return its size."""
     moved, turned, foot, normal, zero = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.zeros(3)
-    middle, row, turn, new = np.empty(3), np.empty(6), np.empty((3, 3)), np.empty((3, 3))
-    for reach in reaches:
-        matrix, right = np.zeros((6, 6)), np.zeros(6)
-        _apply(rotation, translation, centre, middle)
+    middle, row, turn, new = np.empty(3), np.zeros(7), np.empty((3, 3)), np.empty((3, 3))
+    for relative in reaches:
+        matrix, right = np.zeros((7, 7)), np.zeros(7)
+        reach, scaled = size * relative, size * rotation
+        _apply(scaled, translation, centre, middle)
         total = 0.0
         for p in range(len(points)):
-            _apply(rotation, translation, points[p], moved)
+            _apply(scaled, translation, points[p], moved)
             distance = _look_up(moved, origin, step, feet, normals, foot, normal)
             _apply(rotation, zero, point_normals[p], turned)
             if distance >= reach or not _agrees(turned, normal, oriented):
@@ -174,17 +182,19 @@ def _descend(
                 x * normal[1] - y * normal[0],
             )
             row[3], row[4], row[5] = normal[0], normal[1], normal[2]
+            if grows:
+                row[6] = x * normal[0] + y * normal[1] + z * normal[2]
             gap = 0.0
             for a in range(3):
                 gap += (moved[a] - foot[a]) * normal[a]
             total += weight
-            for a in range(6):
+            for a in range(7):
                 right[a] -= weight * row[a] * gap
                 for b in range(a + 1):
                     matrix[a, b] += weight * row[a] * row[b]
-        if total < 6.0:
-            return
-        for a in range(6):
+        if total < 7.0:
+            return size
+        for a in range(7):
             matrix[a, a] += 0.01 * total
         motion = solve_spd(matrix, right)
         for a in range(3):
@@ -197,15 +207,19 @@ def _descend(
         for a in range(3):
             for b in range(3):
                 rotation[a, b] = new[a, b]
-        _apply(rotation, zero, centre, moved)
+        size *= 1.0 + min(max(motion[6] / length, -STRIDE), STRIDE)
+        _apply(size * rotation, zero, centre, moved)
         for a in range(3):
             translation[a] = middle[a] + motion[3 + a] - moved[a]
+    return size
 
 
 @njit(parallel=True, cache=True)
 def descend(
     rotations: Floats,
     translations: Floats,
+    sizes: Floats,
+    grows: bool,
     points: Floats,
     point_normals: Floats,
     oriented: bool,
@@ -217,9 +231,12 @@ def descend(
     feet: Floats,
     normals: Floats,
 ) -> None:
-    """Improve each pose of a stack in place by truncated point-to-plane steps, one for each of `reaches` (mm)."""
+    """Improve each pose of a stack in place by truncated point-to-plane steps, one for each of `reaches` (mm).
+
+    The sizes are improved as well where the cloud `grows`.
+    """
     for h in prange(len(rotations)):
-        _descend(
-            rotations[h], translations[h], points, point_normals, oriented, reaches, centre, length,
+        sizes[h] = _descend(
+            rotations[h], translations[h], sizes[h], grows, points, point_normals, oriented, reaches, centre, length,
             origin, step, feet, normals,
         )  # fmt: skip
