@@ -24,6 +24,11 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+LOOPBACK = "127.0.0.1"
+HostAddress = Annotated[
+    str, typer.Option("--host", help="Address to listen on; any other than the default lets other computers in.")
+]
+OpenBrowser = Annotated[bool, typer.Option(help="Open the page in the browser of this desktop.")]
 RecipePath = Annotated[Path, typer.Argument(metavar="RECIPE", help="The recipe, a TOML file.")]
 
 
@@ -147,6 +152,22 @@ def screenshot(
 
     screenshot(out, file, name=name, field=field, view=view, size=size, limits=limits)
     typer.echo(f"picture: {file}")
+
+
+@app.command()
+def view(
+    out: Annotated[list[Path], typer.Argument(metavar="OUT...", help="Folders of finished inspections.")],
+    recipe: Annotated[
+        Path | None, typer.Option(help="The recipe that flags are saved in; default: looked for near the first OUT.")
+    ] = None,
+    host: HostAddress = LOOPBACK,
+    browser: OpenBrowser = True,
+) -> None:
+    """Show maps side by side in the browser: fields, values, sections, flags."""
+    from inspect3d.web.serve import serve
+    from inspect3d.web.view_page import view_of
+
+    serve(view_of(out, recipe).page, host, browser, typer.echo)
 
 
 @app.command()

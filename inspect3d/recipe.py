@@ -93,10 +93,11 @@ class Coating(_Table):
 
 
 class Landmark(_Table):
-    """A point of the CAD and the same point as measured, mm."""
+    """A point of the CAD and the same point as measured, mm; the name is for people."""
 
     cad: Vector
     measured: Vector
+    name: str = ""
 
 
 class Start(_Table):
@@ -269,7 +270,18 @@ def load_recipe(path: Path) -> Recipe:
     InputError
         A sentence on the first mistake: where it stands, and what is right there.
     """
-    data = _toml(readable(path, "recipe"))
+    return checked_recipe(readable(path, "recipe").read_bytes(), path)
+
+
+def checked_recipe(content: bytes, path: Path) -> Recipe:
+    """Return the recipe that a TOML text is, if it lies at `path`, with all files it names readable.
+
+    Raises
+    ------
+    InputError
+        A sentence on the first mistake: where it stands, and what is right there.
+    """
+    data = _toml(content, path)
     if data.get("schema", 1) != 1:
         raise InputError(
             f"{path.name}: schema = {data['schema']!r} is unknown; this version of inspect3d reads schema = 1."
@@ -284,9 +296,9 @@ def load_recipe(path: Path) -> Recipe:
     return recipe
 
 
-def _toml(path: Path) -> dict[str, Any]:
+def _toml(content: bytes, path: Path) -> dict[str, Any]:
     try:
-        return _immutable(tomllib.loads(path.read_bytes().decode("utf-8-sig")))
+        return _immutable(tomllib.loads(content.decode("utf-8-sig")))
     except UnicodeDecodeError as error:
         raise InputError(f"{path.name} is not a recipe: a recipe is a TOML text file in UTF-8.") from error
     except (tomllib.TOMLDecodeError, RecursionError) as error:

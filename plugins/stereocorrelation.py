@@ -32,10 +32,11 @@ PATCH = 0.125  # of the part's size: length over which the systematic shift of a
 
 @dataclass(frozen=True)
 class PickedPoint:
-    """A point of the CAD, mm, and its pixel in each picture."""
+    """A point of the CAD, mm, and its pixel in each picture; the name is for people."""
 
     cad: tuple[float, float, float]
     pixels: tuple[tuple[float, float], ...]
+    name: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ function withUncertainty(value, sigma) {
 
 class Pane {
   /* root: an element that becomes the pane. part: see Surface; and centre, mm, of the CAD frame.
-     told: { start: direction to look from, click(node, pane, event), removed(pin), grab(x, y, event) } */
+     told: { start: direction to look from, click(node, pane, event), removed(pin) } */
   constructor(root, part, eye, look, told) {
     this.part = part;
     this.pins = [];
@@ -45,7 +45,7 @@ class Pane {
     this.probe.hidden = true;
     this.length = made("div", "length");
     canvas.tabIndex = 0;
-    canvas.setAttribute("aria-label", "3-D map; arrow keys turn it, shift and arrow keys move it, + and \u2212 zoom, 0 starts over");
+    canvas.setAttribute("aria-label", "3-D map; arrow keys turn it, shift and arrow keys move it, + and \u2212 zoom, 0 starts over, Enter flags what lies in the middle");
     area.append(canvas, this.overlay, this.probe, this.compass(), this.length);
     root.append(area, this.bar);
     this.canvas = canvas;
@@ -53,7 +53,6 @@ class Pane {
     this.surface.after = (pixel) => { this.placePins(); this.placeCompass(); this.placeLength(pixel); };
     const looked = {
       start: told.start,
-      grab: told.grab,
       leave: () => { this.probe.hidden = true; this.waiting = null; },
       hover: (x, y) => this.hover(x, y),
       click: (x, y, event) => {
@@ -108,7 +107,7 @@ class Pane {
   words(node, judged) {
     const [deviation, sigma, third] = this.map.fields, value = deviation.values[node];
     if (!Number.isFinite(value)) return this.part.crease[node] ? "on an edge: no deviation" : "not measured";
-    const verdict = judged && third && third.classes.length && third.shown[node] ? `, ${third.classes[third.values[node] - 1]}` : "";
+    const verdict = judged && third && third.classes.length && third.values && third.shown[node] ? `, ${third.classes[third.values[node] - 1]}` : "";
     return withUncertainty(value, sigma.values[node]) + verdict;
   }
   position(node) {
@@ -128,8 +127,8 @@ class Pane {
     probe.hidden = !found;
     if (!found) return;
     const lines = [made("strong", "", this.words(found.node, true)), made("span", "", `at ${this.position(found.node)} mm`)];
-    const field = this.field, value = field.values[found.node];
-    if (!field.classes.length && this.map.fields.indexOf(field) > 1 && Number.isFinite(value))
+    const field = this.field, value = field && field.values[found.node];
+    if (field && !field.classes.length && this.map.fields.indexOf(field) > 1 && Number.isFinite(value))
       lines.splice(1, 0, made("span", "", minus(`${field.title} ${Number(value.toPrecision(3))}${field.unit ? ` ${field.unit}` : ""}`)));
     probe.replaceChildren(...lines);
     const left = x + 16 + probe.offsetWidth > this.canvas.clientWidth ? x - 12 - probe.offsetWidth : x + 16;
@@ -156,7 +155,7 @@ class Pane {
     for (const each of this.pins) {
       const k = each.node, [x, y] = this.surface.onScreen(this.surface.node(k));
       const facing = dot(near, [normals[3 * k], normals[3 * k + 1], normals[3 * k + 2]]) > 0;
-      each.flag.hidden = !facing || x < 0 || y < 0 || x > w || y > h;
+      each.flag.hidden = !facing || this.surface.cutAway(this.surface.node(k)) || x < 0 || y < 0 || x > w || y > h;
       each.text.textContent = (each.name ? `${each.name}: ` : "") + this.words(k, false);
       each.flag.classList.toggle("flipped", x > 0.7 * w);
       each.flag.style.transform = `translate(${x}px, ${y}px)`;

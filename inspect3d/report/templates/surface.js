@@ -144,7 +144,7 @@ class Surface {
     this.shown = this.attribute("shown", 1, gl.UNSIGNED_BYTE, false, new Uint8Array(this.count));
     this.faces = this.indices(part.triangles);
     this.edges = this.indices(part.edges);
-    this.coarse = part.coarse ? this.indices(part.coarse) : null;
+    this.coarse = part.coarse && part.coarse.length ? this.indices(part.coarse) : null;
     this.lineArray = gl.createVertexArray();
     gl.bindVertexArray(this.lineArray);
     this.lineBuffer = this.attribute("node", 3, gl.FLOAT, false, new Float32Array(0));
@@ -232,6 +232,13 @@ class Surface {
     this.drawLines();
     if (this.after) this.after(p);
   }
+  /* Take edges and coarse triangles of the part that have come after the rest. */
+  refine() {
+    this.gl.bindVertexArray(this.array);
+    this.edges = this.indices(this.part.edges);
+    this.coarse = this.part.coarse && this.part.coarse.length ? this.indices(this.part.coarse) : null;
+    this.draw();
+  }
   drawn(kind, buffer, values) {
     this.gl.bindBuffer(this.gl.ELEMENT_ARRAY_BUFFER, buffer);
     this.gl.drawElements(kind, values.length, this.gl.UNSIGNED_INT, 0);
@@ -258,12 +265,13 @@ class Surface {
       this.canvas.clientHeight / 2 - (dot(t[1], point) + this.eye.shift[1]) / p, dot(t[2], point)];
   }
   node(k) { return [this.part.nodes[3 * k], this.part.nodes[3 * k + 1], this.part.nodes[3 * k + 2]]; }
+  cutAway(point) { return this.plane !== null && dot(this.plane.normal, point) > this.plane.offset; }
   /* Return what lies under a place of the canvas: the point, its nearest node and how near it is; null for nothing or the inside. */
   hit(x, y) {
     const { nodes, triangles } = this.part, p = this.eye.pixel(this.canvas), t = this.eye.turn;
     const sx = (x - this.canvas.clientWidth / 2) * p - this.eye.shift[0], sy = (this.canvas.clientHeight / 2 - y) * p - this.eye.shift[1];
     const along = (axis, k) => axis[0] * nodes[3 * k] + axis[1] * nodes[3 * k + 1] + axis[2] * nodes[3 * k + 2];
-    const [right, up, near] = t, plane = this.plane;
+    const [right, up, near] = t;
     let found = null, top = -Infinity;
     for (let m = 0; m < triangles.length; m += 3) {
       const a = triangles[m], b = triangles[m + 1], c = triangles[m + 2];
@@ -276,7 +284,7 @@ class Surface {
       const z = (wa * along(near, a) + wb * along(near, b) + wc * along(near, c)) / sum;
       if (z <= top) continue;
       const point = right.map((_, k) => right[k] * sx + up[k] * sy + near[k] * z);
-      if (plane && dot(plane.normal, point) > plane.offset) continue;
+      if (this.cutAway(point)) continue;
       top = z;
       found = sum < 0 ? null : { point, node: wa >= wb && wa >= wc ? a : wb >= wc ? b : c, near: z };
     }
@@ -285,13 +293,12 @@ class Surface {
 }
 
 /* Let mouse, touch and keyboard move the eye of a canvas. told: { hover(x, y), leave(), click(x, y, event), start: the
-   direction to look from at the beginning, grab(x, y): whether a drag that begins there is somebody else's } */
+   direction to look from at the beginning } */
 function steer(canvas, eye, told) {
   const touching = new Map();
   let travelled = 0;
   const here = (event) => { const box = canvas.getBoundingClientRect(); return [event.clientX - box.left, event.clientY - box.top]; };
   canvas.addEventListener("pointerdown", (event) => {
-    if (told.grab && told.grab(...here(event), event)) return;
     canvas.setPointerCapture(event.pointerId);
     touching.set(event.pointerId, here(event));
     travelled = 0;
@@ -336,6 +343,7 @@ function steer(canvas, eye, told) {
     else if (event.key === "+" || event.key === "=") eye.enlarge(1.15, ...middle, canvas);
     else if (event.key === "-") eye.enlarge(1 / 1.15, ...middle, canvas);
     else if (event.key === "0" || event.key === "Home") eye.look(told.start);
+    else if (event.key === "Enter") told.click(...middle, event);
     else return;
     event.preventDefault();
   });

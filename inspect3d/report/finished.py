@@ -1,0 +1,129 @@
+"""A finished inspection, read back from the folder that a run has left behind."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from inspect3d.arrays import Floats
+from inspect3d.file_name import file_name
+from inspect3d.nominal.nominal import InspectionMesh
+from inspect3d.outcome import InputError, Status
+
+
+@dataclass(frozen=True, eq=False)
+class FinishedMap:
+    """The map of a measurement.
+
+    Parameters
+    ----------
+    name : of the measurement
+    mesh : the inspection mesh; its faces are not known any more
+    fields : (n,) each, of the nodes: deviation, sigma, verdict, ...
+    """
+
+    name: str
+    mesh: InspectionMesh
+    fields: Mapping[str, Floats]
+
+    def field(self, name: str) -> Floats:
+        """Return a field of the nodes, (n,).
+
+        Raises
+        ------
+        InputError
+            The map has no such field.
+        """
+        if name not in self.fields:
+            raise InputError(f"The map of {self.name!r} has no field {name!r}; it has {', '.join(self.fields)}.")
+        return self.fields[name]
+
+
+@dataclass(frozen=True, eq=False)
+class Finished:
+    """A finished inspection.
+
+    Parameters
+    ----------
+    folder : where the results lie
+    values : what results.json holds
+    """
+
+    folder: Path
+    values: Mapping[str, Any]
+
+    @property
+    def with_map(self) -> list[str]:
+        """Return the names of the measurements that have a map."""
+        return [name for name, each in self.values["measurements"].items() if Status(each["status"]).has_map]
+
+    def map(self, name: str | None = None) -> FinishedMap:
+        """Return the map of a measurement, by default of the first that has one.
+
+        Raises
+        ------
+        InputError
+            There is no such measurement, it has no map, or its file is missing or broken.
+        """
+        measurements, with_map = self.values["measurements"], self.with_map
+        if not with_map:
+            raise InputError(f"No measurement in {self.folder} has a map; results.json says why.")
+        if name is None:
+            name = with_map[0]
+        if name not in measurements:
+            known = ", ".join(map(repr, measurements))
+            raise InputError(f"{self.folder} holds no measurement {name!r}; it holds {known}.")
+        if name not in with_map:
+            status = measurements[name]["status"]
+            raise InputError(f"{name!r} has no map, as it ended {status}; results.json says why.")
+        try:
+            return _read(self.folder / f"{file_name(name)}.vtp", name)
+        except ValueError as error:
+            raise InputError(f"results.json in {self.folder} is not of inspect3d: {error}.") from error
+
+
+def open_results(folder: Path) -> Finished:
+    """Return a finished inspection.
+
+    Parameters
+    ----------
+    folder : what `inspect3d run` wrote
+
+    Raises
+    ------
+    InputError
+        The folder holds no inspection.
+    """
+    try:
+        values = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        raise InputError(f"{folder} holds no inspection: name the folder that `inspect3d run` wrote.") from None
+    return Finished(folder, values)
+
+
+def _read(file: Path, name: str) -> FinishedMap:
+    import pyvista
+
+    if not file.is_file():
+        raise InputError(f"{file} is missing: run the inspection again.")
+    polydata = pyvista.read(file)
+    if not isinstance(polydata, pyvista.PolyData) or polydata.n_points == 0:
+        raise InputError(f"{file} is not a map of inspect3d: run the inspection again.")
+    fields = {
+        key: np.asarray(values, dtype=np.float64)
+        for key, values in polydata.point_data.items()
+        if np.asarray(values).ndim == 1
+    }
+    mesh = InspectionMesh(
+        nodes=np.asarray(polydata.points, dtype=np.float64),
+        triangles=np.asarray(polydata.regular_faces, dtype=np.int64),
+        normals=np.asarray(polydata.point_data["Normals"], dtype=np.float64),
+        crease=np.asarray(polydata.point_data["crease"], dtype=bool),
+        face=np.full(polydata.n_points, -1, dtype=np.int64),
+    )
+    return FinishedMap(name, mesh, fields)
