@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
+
 from inspect3d import __version__
 from inspect3d.compare.compare import Compare
 from inspect3d.compare.comparison import Comparison
@@ -70,7 +72,7 @@ def check(recipe_path: Path) -> list[str]:
     ]
     lines += nominal.remarks
     lines += [f"{job.table.name}: {job.source}; {job.method!r}" for job in _jobs(recipe)]
-    return [*lines, *_warnings(recipe), "The recipe and its files are in order."]
+    return [*lines, *_warnings(recipe, nominal), "The recipe and its files are in order."]
 
 
 def inspect(recipe: Recipe, progress: Progress) -> Record:
@@ -83,7 +85,7 @@ def inspect(recipe: Recipe, progress: Progress) -> Record:
     parts = tuple(measured(job, recipe, nominal, progress) for job in jobs)
     with progress.stage("comparing the methods"):
         comparisons = _compared(recipe, nominal, parts)
-    return Record(recipe, nominal, parts, inputs, _versions(), _warnings(recipe), comparisons)
+    return Record(recipe, nominal, parts, inputs, _versions(), _warnings(recipe, nominal), comparisons)
 
 
 def _compared(recipe: Recipe, nominal: Nominal, parts: tuple[MeasuredPart, ...]) -> tuple[Comparison, ...]:
@@ -113,10 +115,13 @@ def _nominal(recipe: Recipe) -> Nominal:
     return load_nominal(recipe.cad, name=part.name, units=part.units, element_size=part.element_size, flip=part.flip)
 
 
-def _warnings(recipe: Recipe) -> tuple[str, ...]:
-    if recipe.report.sections:
-        return ("The recipe asks for sections: this version does not draw them.",)
-    return ()
+def _warnings(recipe: Recipe, nominal: Nominal) -> tuple[str, ...]:
+    warnings = []
+    for k, plane in enumerate(recipe.report.sections):
+        height = (nominal.mesh.nodes - plane.point) @ np.array(plane.normal)
+        if not height.min() <= 0 <= height.max():
+            warnings.append(f"The plane of report.sections[{k}] does not meet the part, so there is no profile of it.")
+    return tuple(warnings)
 
 
 def _inputs(recipe: Recipe) -> tuple[InputFile, ...]:

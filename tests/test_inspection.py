@@ -119,10 +119,12 @@ def test_files_aligned_separately_have_an_alignment_each(tmp_path):
     assert len(one(path).alignments) == 2
 
 
-def test_sections_are_warned_of(tmp_path):
-    rest = "[report]\nsections = [ { point = [0, 0, 0], normal = [0, 1, 0] } ]"
-    record = inspect(load_recipe(recipe(tmp_path, rest=rest)), Progress())
-    assert "sections" in record.warnings[0]
+def test_a_section_beside_the_part_is_warned_of(tmp_path):
+    planes = "{ point = [999, 0, 0], normal = [1, 0, 0] }, { point = [30, 0, 0], normal = [1, 0, 0] }"
+    lines = check(recipe(tmp_path, rest=f"[report]\nsections = [ {planes} ]"))
+    assert [line for line in lines if "does not meet" in line] == [
+        "The plane of report.sections[0] does not meet the part, so there is no profile of it."
+    ]
 
 
 def test_check_reads_everything_and_measures_nothing(tmp_path):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from inspect3d.record import Record
 from inspect3d.report.account import account
-from inspect3d.report.blocks import Document, Picture
+from inspect3d.report.blocks import Chapter, Document, Picture
 from inspect3d.report.digits import grouped, number
 from inspect3d.report.front import front
 from inspect3d.report.pictures import Shown
@@ -18,7 +18,11 @@ from inspect3d.report.provenance import part_chapter, provenance_chapter, rule_c
 
 
 def document(
-    record: Record, values: Mapping[str, Any], shown: Mapping[str, tuple[Shown, ...]], moment: datetime
+    record: Record,
+    values: Mapping[str, Any],
+    shown: Mapping[str, tuple[Shown, ...]],
+    moment: datetime,
+    further: Sequence[Chapter] = (),
 ) -> Document:
     """Return the report.
 
@@ -28,6 +32,7 @@ def document(
     values : what results.json holds
     shown : the pictures of each measurement, and under "" the one of the part
     moment : the date on the report
+    further : chapters that follow those of the measurements
     """
     pictures = {name: [Picture(each.file, each.words) for each in found] for name, found in shown.items()}
     accounts = [
@@ -36,6 +41,7 @@ def document(
     ]
     chapters = (
         *(each.chapter for each in accounts),
+        *further,
         part_chapter(record, _part_rows(record, values["part"]), pictures[""][0], "part"),
         rule_chapter(record, "rule"),
         provenance_chapter(record, "provenance"),

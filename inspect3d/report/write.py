@@ -8,12 +8,14 @@ from pathlib import Path
 from inspect3d.progress import Progress
 from inspect3d.record import Record
 from inspect3d.report.document import document
+from inspect3d.report.layout import Layout
 from inspect3d.report.maps import cloud_polydata, map_polydata
 from inspect3d.report.page import page
 from inspect3d.report.pdf import pdf
-from inspect3d.report.pictures import draw_pictures, start
+from inspect3d.report.pictures import SIZE, draw_pictures, start
 from inspect3d.report.qif import qif
 from inspect3d.report.results import as_json, results
+from inspect3d.report.sections import draw_sections
 from inspect3d.report.tables import write_tables
 from inspect3d.report.viewer import viewer_data
 
@@ -44,7 +46,8 @@ def write_report(
     pictures.mkdir(exist_ok=True)
     shown = draw_pictures(record, pictures, progress)
     (folder / "results.qif").write_bytes(qif(record, moment))
-    report = document(record, values, shown, moment)
+    sections = draw_sections(record, pictures, Layout(*SIZE))
+    report = document(record, values, shown, moment, tuple(each for each in (sections,) if each))
     html = page(report, pictures, viewer_data(record, start(shown)))
     (folder / "report.html").write_text(html, encoding="utf-8")
     if "pdf" in record.recipe.report.formats:
