@@ -16,6 +16,9 @@ BACK = (111, 118, 131)
 """The inside of an open surface."""
 BANDS = ("too little", "undecided, low", "conform", "undecided, high", "too much")
 BAND_COLOURS = ((44, 123, 182), (171, 217, 233), (255, 255, 191), (253, 174, 97), (215, 25, 28))
+EN_STEPS = (0.5, 1.0, 1.5)
+EN_WORDS = ("up to 0.5", "0.5 to 1", "1 to 1.5", "above 1.5")
+EN_COLOURS = ((255, 255, 204), (254, 217, 118), (240, 100, 40), (128, 0, 38))
 STEPS = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
 
@@ -73,6 +76,16 @@ def verdict_scale() -> ColourScale:
     """Return the classes of a verdict: conform, undecided, nonconform."""
     colours = np.array(BAND_COLOURS[2:], dtype=np.uint8)
     return ColourScale("Verdict", "", (0.5, 3.5), colours, ("conform", "undecided", "nonconform"))
+
+
+def en_scale() -> ColourScale:
+    """Return four classes of E_n, pale to dark: what lies above 1 differs by more than its uncertainty."""
+    return ColourScale("E_n", "", (0.5, 4.5), np.array(EN_COLOURS, dtype=np.uint8), EN_WORDS, rest="not compared")
+
+
+def en_classes(values: Floats) -> Floats:
+    """Return the class of each value of E_n, (n,) 1 to 4; NaN where there is none."""
+    return np.where(np.isfinite(values), 1.0 + np.digitize(values, EN_STEPS), np.nan)
 
 
 def mark_scale(title: str, words: str) -> ColourScale:

@@ -11,6 +11,7 @@ import numpy as np
 from inspect3d.record import Record
 from inspect3d.report.account import account
 from inspect3d.report.blocks import Chapter, Document, Picture
+from inspect3d.report.comparisons import agreement
 from inspect3d.report.digits import grouped, number
 from inspect3d.report.front import front
 from inspect3d.report.pictures import Shown
@@ -46,7 +47,9 @@ def document(
         rule_chapter(record, "rule"),
         provenance_chapter(record, "provenance"),
     )
-    return Document(record.recipe.part.name, _under(record, moment), front(record, accounts, ()), chapters)
+    return Document(
+        record.recipe.part.name, _under(record, moment), front(record, accounts, agreement(record)), chapters
+    )
 
 
 def _under(record: Record, moment: datetime) -> str:

@@ -67,12 +67,12 @@ def _worst(record: Record) -> list[Block]:
     places = worst_places(record)
     if not any(part.deviation is not None for part in record.parts):
         return []
-    title = Heading("Worst places")
+    title = Heading("Worst places: deviation ± U (k = 2)")
     if not places:
         return [title, Paragraph("No measured node deviates by more than its expanded uncertainty U (k = 2).")]
     parts = [part for part in record.parts if part.status.has_map and part.deviation is not None]
     judged = any(part.verdict is not None for part in parts)
-    names = (f"{part.name}: deviation ± U, mm" for part in parts)
+    names = (f"{part.name}, mm" for part in parts)
     head = ("Place (x, y, z), mm", "Found by", *(["Verdict"] if judged else []), *names)
     columns: list[Column] = ["text", "name", *_numbers(len(parts))]
     if judged:

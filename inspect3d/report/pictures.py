@@ -45,20 +45,20 @@ class Shown:
     viewpoint: Viewpoint | None = None
 
 
-def draw_pictures(record: Record, folder: Path, progress: Progress) -> dict[str, tuple[Shown, ...]]:
+def draw_pictures(record: Record, folder: Path, views: Views, progress: Progress) -> dict[str, tuple[Shown, ...]]:
     """Write all pictures as PNG.
 
     Parameters
     ----------
     record : the inspection
     folder : where they go; exists
+    views : of the inspection mesh
     progress : told how far it is
 
     Returns
     -------
     for each measurement its pictures in the report's order, and under "" the one of the part
     """
-    views = Views.of(record.nominal.mesh)
     shown: dict[str, tuple[Shown, ...]] = {"": (_draw_part(record, folder, views),)}
     with_map = [part for part in record.parts if part.status.has_map and part.deviation is not None]
     for k, part in enumerate(with_map):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from inspect3d.progress import Progress
 from inspect3d.record import Record
+from inspect3d.report.comparisons import draw_comparisons
 from inspect3d.report.document import document
 from inspect3d.report.layout import Layout
 from inspect3d.report.maps import cloud_polydata, map_polydata
@@ -18,6 +19,7 @@ from inspect3d.report.results import as_json, results
 from inspect3d.report.sections import draw_sections
 from inspect3d.report.tables import write_tables
 from inspect3d.report.viewer import viewer_data
+from inspect3d.report.views import Views
 
 
 def write_report(
@@ -44,10 +46,12 @@ def write_report(
             cloud_polydata(part).save(folder / f"{part.name}_points.vtp")
     pictures = folder / "pictures"
     pictures.mkdir(exist_ok=True)
-    shown = draw_pictures(record, pictures, progress)
+    views = Views.of(record.nominal.mesh)
+    shown = draw_pictures(record, pictures, views, progress)
     (folder / "results.qif").write_bytes(qif(record, moment))
-    sections = draw_sections(record, pictures, Layout(*SIZE))
-    report = document(record, values, shown, moment, tuple(each for each in (sections,) if each))
+    layout = Layout(*SIZE)
+    further = (draw_sections(record, pictures, layout), draw_comparisons(record, pictures, views, layout))
+    report = document(record, values, shown, moment, [each for each in further if each is not None])
     html = page(report, pictures, viewer_data(record, start(shown)))
     (folder / "report.html").write_text(html, encoding="utf-8")
     if "pdf" in record.recipe.report.formats:
