@@ -120,6 +120,22 @@ def demo(
 
 
 @app.command()
+def compare(
+    folders: Annotated[list[Path], typer.Argument(metavar="OUT...", help="Folders of finished inspections.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the results.")] = Path("out/compare"),
+) -> None:
+    """Compare inspections of one part that were run separately; leave one report."""
+    from inspect3d.comparing import compare_runs
+    from inspect3d.summary import summary
+    from inspect3d.terminal import terminal
+
+    with terminal(sys.stderr) as progress:
+        record = compare_runs(folders, out, progress)
+    for line in summary(record, out):
+        typer.echo(line)
+
+
+@app.command()
 def check(recipe: RecipePath) -> None:
     """Check a recipe and its files without measuring."""
     from inspect3d.inspection import check

@@ -5,10 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
-import shutil
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -20,12 +17,12 @@ from inspect3d.compare.comparison import Comparison
 from inspect3d.compare.measured_map import MeasuredMap
 from inspect3d.job import Job, measured
 from inspect3d.nominal.load import load_nominal
-from inspect3d.nominal.nominal import Nominal
-from inspect3d.outcome import InputError
+from inspect3d.nominal.nominal import InspectionMesh, Nominal
 from inspect3d.progress import Progress
 from inspect3d.recipe import MeasurementTable, Recipe, load_recipe
 from inspect3d.record import InputFile, MeasuredPart, Record
 from inspect3d.registry import build_for
+from inspect3d.results_folder import replaced
 
 LIBRARIES = ("numpy", "scipy", "numba", "open3d", "pyvista", "pymeshlab", "trimesh", "cadquery-ocp-novtk")
 
@@ -48,7 +45,7 @@ def run(recipe_path: Path, out: Path, progress: Progress | None = None) -> Recor
     """
     progress = progress or Progress()
     recipe = load_recipe(recipe_path)
-    with _replaced(out) as folder:
+    with replaced(out) as folder:
         record = inspect(recipe, progress)
         from inspect3d.report.write import write_report
 
@@ -82,18 +79,22 @@ def inspect(recipe: Recipe, progress: Progress) -> Record:
         inputs = _inputs(recipe)
     with progress.stage("reading the CAD model"):
         nominal = _nominal(recipe)
-    parts = tuple(measured(job, recipe, nominal, progress) for job in jobs)
+    parts = tuple(
+        replace(measured(job, recipe, nominal, progress), sources=_sources(recipe, job.table)) for job in jobs
+    )
     with progress.stage("comparing the methods"):
-        comparisons = _compared(recipe, nominal, parts)
-    return Record(recipe, nominal, parts, inputs, _versions(), _warnings(recipe, nominal), comparisons)
+        comparisons = compared(parts, nominal.mesh)
+    return Record(recipe, nominal, parts, inputs, versions(), _warnings(recipe, nominal), comparisons)
 
 
-def _compared(recipe: Recipe, nominal: Nominal, parts: tuple[MeasuredPart, ...]) -> tuple[Comparison, ...]:
-    maps = []
-    for table, part in zip(recipe.measurements, parts, strict=True):
-        if part.deviation is not None and part.covariance is not None:
-            maps.append(MeasuredMap(part.name, part.deviation, part.covariance, _sources(recipe, table)))
-    return Compare()(tuple(maps), nominal.mesh)
+def compared(parts: tuple[MeasuredPart, ...], mesh: InspectionMesh) -> tuple[Comparison, ...]:
+    """Return the comparisons of every two measurements that have a map."""
+    maps = (
+        MeasuredMap(part.name, part.deviation, part.covariance, part.sources)
+        for part in parts
+        if part.deviation is not None and part.covariance is not None
+    )
+    return Compare()(tuple(maps), mesh)
 
 
 def _sources(recipe: Recipe, table: MeasurementTable) -> dict[str, str]:
@@ -138,36 +139,7 @@ def _sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Return the versions of inspect3d, of Python and of the libraries that compute the results."""
     libraries = {name: version(name) for name in LIBRARIES}
     return {"inspect3d": __version__, "python": platform.python_version(), **libraries}
-
-
-@contextmanager
-def _replaced(out: Path) -> Iterator[Path]:
-    """Give a new folder beside `out` to write into, and put it in the place of `out` once the block has ended well."""
-    out = Path(os.path.abspath(out))
-    if out.exists() and not _may_be_replaced(out):
-        raise InputError(f"{out} is not a folder of results: choose another one, or remove it yourself.")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
-    except OSError as error:
-        raise InputError(f"{out} cannot be written: {error.strerror}. Choose another folder.") from error
-    try:
-        folder.chmod(0o755)
-        yield folder
-        if out.exists():
-            former = folder.with_name(folder.name + "-former")
-            out.rename(former)
-            folder.rename(out)
-            shutil.rmtree(former)
-        else:
-            folder.rename(out)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-def _may_be_replaced(out: Path) -> bool:
-    """Tell whether `out` is a folder that is empty or holds the results of an earlier run."""
-    return out.is_dir() and (not any(out.iterdir()) or (out / "results.json").is_file())

@@ -33,6 +33,7 @@ class MeasuredPart:
     candidates : the poses considered, where the measurement ended ambiguous or failed
     deviation : the map, or None where there is none
     covariance : how the errors of the map hang together; None where there is no map
+    sources : the files it was measured from, name by SHA-256
     verdict : (n,) 0 none, 1 conform, 2 undecided, 3 nonconform, per node; None without a tolerance
     points_cad : (k, 3) mm, the measured points in the CAD frame in the order of the files; None for stereo methods
     point_deviation : (k,) mm, NaN where a point has none
@@ -55,6 +56,7 @@ class MeasuredPart:
     candidates: tuple[Candidate, ...] = ()
     deviation: Deviation | None = None
     covariance: MapCovariance | None = None
+    sources: Mapping[str, str] = field(default_factory=dict)
     verdict: Integers | None = None
     points_cad: Floats | None = None
     point_deviation: Floats | None = None

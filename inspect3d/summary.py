@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from inspect3d.compare.comparison import Comparison
 from inspect3d.deviate.deviation import Deviation
 from inspect3d.deviate.statistics import Statistics
 from inspect3d.nominal.nominal import InspectionMesh
@@ -14,11 +15,13 @@ from inspect3d.record import Record
 
 
 def summary(record: Record, out: Path) -> Iterator[str]:
-    """Yield how each measurement ended, its figures, the warnings, and where the report lies."""
+    """Yield how each measurement ended, its figures, how they agree, the warnings, and where the report lies."""
     for part in record.parts:
         yield f"{part.name} ({part.method}): {part.reason or part.status.words}"
         if part.deviation is not None:
             yield f"    {_figures(part.deviation, record.nominal.mesh)}"
+    for comparison in record.comparisons:
+        yield f"{comparison.a} - {comparison.b}: {_agreement(comparison)}"
     yield from (f"warning: {warning}" for warning in record.warnings)
     yield f"report: {out / 'report.html'}"
 
@@ -31,3 +34,12 @@ def _figures(deviation: Deviation, mesh: InspectionMesh) -> str:
     sigma = np.median(deviation.sigma[observed])
     nodes = f"{np.count_nonzero(observed)} of {len(mesh)} nodes observed"
     return f"mean {figures.mean:+.4f} mm, std {figures.std:.4f} mm, median sigma {sigma:.4f} mm; {nodes}"
+
+
+def _agreement(comparison: Comparison) -> str:
+    if comparison.mean is None or comparison.std is None:
+        return comparison.reason
+    figures = f"mean {comparison.mean:+.4f} mm, std {comparison.std:.4f} mm at {comparison.nodes} common nodes"
+    if comparison.en_rms is None or comparison.en_above_1 is None:
+        return f"{figures}; {comparison.reason}"
+    return f"{figures}; E_n rms {comparison.en_rms:.2f}, above 1 at {100 * comparison.en_above_1:.1f} % of them"

@@ -181,6 +181,7 @@ class Deviate:
             coating=(self.coating, self.coating_sigma),
             calibration=self.calibration,
             refined=self.refine,
+            scale_known=self.scale_known,
         )
 
     def _aligned(

@@ -37,6 +37,7 @@ def results(record: Record) -> dict[str, Any]:
         "versions": dict(record.versions),
         "inputs": [{"path": file.path, "sha256": file.sha256} for file in record.inputs],
         "warnings": list(record.warnings),
+        "recipe": record.recipe.model_dump(mode="json", by_alias=True, exclude_defaults=True),
         "measurements": {part.name: _measurement(record, mesh, part) for part in record.parts},
         "comparisons": [_comparison(each) for each in record.comparisons],
     }
@@ -96,6 +97,7 @@ def _measurement(record: Record, mesh: InspectionMesh, part: MeasuredPart) -> di
         "labels": [_label(reading) for reading in readings(mesh, part, record.recipe.report.labels)],
         "noise": part.noise,
         "hidden": list(part.hidden),
+        "contributions": [list(each) for each in part.contributions],
         "cameras": [_camera(view) for view in part.views],
         "remarks": list(part.remarks),
         "seconds": {stage: float(seconds) for stage, seconds in part.seconds.items()},

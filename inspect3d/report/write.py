@@ -5,6 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
+from inspect3d.deviate.errors_file import write_errors
 from inspect3d.progress import Progress
 from inspect3d.record import Record
 from inspect3d.report.comparisons import draw_comparisons
@@ -25,7 +26,7 @@ from inspect3d.report.views import Views
 def write_report(
     record: Record, folder: Path, progress: Progress | None = None, moment: datetime | None = None
 ) -> None:
-    """Write results.json and .qif, the maps (.vtp, .csv, .parquet) and clouds (.vtp), the pictures and the report.
+    """Write results.json and .qif, the maps (.vtp, .csv, .parquet) and clouds (.vtp), errors (.npz), pictures, report.
 
     Parameters
     ----------
@@ -42,6 +43,8 @@ def write_report(
             continue
         map_polydata(record.nominal.mesh, part).save(folder / f"{part.name}.vtp")
         write_tables(record, part, folder)
+        if part.covariance is not None:
+            write_errors(folder / f"{part.name}_errors.npz", part.covariance, part.sources, record.nominal.mesh.face)
         if part.points_cad is not None and part.point_deviation is not None:
             cloud_polydata(part).save(folder / f"{part.name}_points.vtp")
     pictures = folder / "pictures"
