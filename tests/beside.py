@@ -10,6 +10,9 @@ from scipy.optimize import minimize_scalar
 from inspect3d.nominal.brep import Brep
 from inspect3d.nominal.closest_parameters import closest_parameters
 
+CREASED = 2.5
+"""Two faces at 30 degrees may meet two tolerances of their edge off it."""
+
 
 class Beside(NamedTuple):
     """A face beside a node on an edge.
@@ -18,31 +21,27 @@ class Beside(NamedTuple):
     ----------
     off : mm, from the node to the trimmed face
     tolerance : mm, of the edge; of the vertex where the node lies on one
-    gape : mm, between the borders of both faces there
     """
 
     off: float
     tolerance: float
-    gape: float
 
 
-def beside(part: Brep, face: int, node: np.ndarray) -> list[Beside]:
+def beside(part: Brep, face: int, node: np.ndarray, near: float = CREASED) -> list[Beside]:
     """Return the faces that share with a face an edge on which a node (3,) mm lies; none at a seam, a rim or a tip."""
     found = []
-    for edge in edges_at(part, face, node):
+    for edge in edges_at(part, face, node, near):
         t = _parameter(part, edge, node)
         for other in set(part.edge_faces[edge]) - {face}:
-            border = _on_border(part, edge, face, t, node)
-            gape = np.linalg.norm(_on_border(part, edge, other, t, border) - border)
-            found.append(Beside(_off(part, edge, other, t, node), _foot(part, edge, node)[1], float(gape)))
+            found.append(Beside(_off(part, edge, other, t, node), _foot(part, edge, node)[1]))
     return found
 
 
-def edges_at(part: Brep, face: int, node: np.ndarray) -> list[int]:
-    """Return the edges of a face on which a node lies: two faces at 30 degrees may meet two tolerances off theirs."""
+def edges_at(part: Brep, face: int, node: np.ndarray, near: float = CREASED) -> list[int]:
+    """Return the edges of a face on which a node lies, within `near` tolerances of it."""
     own = [edge for edge, faces in enumerate(part.edge_faces) if face in faces]
     feet = [_foot(part, edge, node) for edge in own]
-    return [edge for edge, (distance, tolerance) in zip(own, feet, strict=True) if distance < 2.5 * tolerance + 1e-6]
+    return [edge for edge, (distance, tolerance) in zip(own, feet, strict=True) if distance < near * tolerance + 1e-6]
 
 
 def _foot(part: Brep, edge: int, node: np.ndarray) -> tuple[float, float]:

@@ -9,17 +9,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from inspect3d.arrays import Booleans, Floats, Integers, unit
-from inspect3d.nominal.brep import Brep
-from inspect3d.nominal.meeting import meeting
+from inspect3d.nominal.owned import GAPE, owned
 from inspect3d.nominal.remeshing import FEATURE_ANGLE
 from inspect3d.nominal.sharp import corners_of_lines, sides_of
 from inspect3d.nominal.tessellation import Tessellation
 
-_GAPE = 1e-8
-"""Faces that gape by more than this, mm, leave doubt who owns the nodes between them."""
-
 _OFF = 5e-7
-"""So does an edge or a vertex that may be farther than this, mm, from the borders of its faces."""
+"""An edge or a vertex that may be farther than this, mm, from the borders of its faces does not say where they meet."""
+
+_SLIDES = np.arange(1, 11).repeat(2) / 10 * np.tile([1.0, -1.0], 10)
+"""How far to slide along an edge, in shares of what is allowed, the shortest ways first."""
 
 
 class Placed(NamedTuple):
@@ -68,8 +67,8 @@ class Lines:
         sides = sides_of(mesh.vertices, mesh.triangles)
         rims = sides.ends[sides.uses != 2] @ (len(mesh.vertices), 1)
         is_rim = np.isin(np.sort(mesh.segments, axis=1) @ (len(mesh.vertices), 1), rims)
-        halfway = np.full(len(segment), 0.5)
-        return np.flatnonzero(is_rim | self._on_edges(segment, halfway, (start + end) / 2).crease)
+        halfway = self._nearest(mesh.segment_edge, self._t(segment, np.full(len(segment), 0.5)), (start + end) / 2)
+        return np.flatnonzero(is_rim | self._on_edges(mesh.segment_edge, halfway).crease)
 
     @cached_property
     def corners(self) -> Integers:
@@ -92,25 +91,35 @@ class Lines:
         brep, places = self.tessellation.brep, self.tessellation.vertices[vertex]
         for row, (faces, uv) in enumerate(around):
             off = np.linalg.norm(brep.points_at(faces[:1], uv[:1]) - places[row], axis=1) > _OFF
-            points[row : row + 1], face[row : row + 1] = _owned(brep, faces[None], uv[None], off)
+            points[row : row + 1], face[row : row + 1], _ = owned(brep, faces[None], uv[None], off)
         return Placed(points, self._vertex_normals[vertex], face, self._folded[vertex])
 
-    def at_segments(self, segment: Integers, share: Floats, nodes: Floats) -> Placed:
+    def at_segments(self, segment: Integers, share: Floats, nodes: Floats, slide: float) -> Placed:
         """Return the exact points of edges nearest to nodes (k, 3) mm.
 
         Where the faces beside gape, that is where they meet, if one of them holds that place; otherwise it is on the
-        face they gape from least, or of two the one with the lower number.
+        face they gape from least, or of two the one with the lower number. Where they gape by more than the tolerance
+        of the edge, the node slides along it to the nearest place where they do not, if there is one.
 
         Parameters
         ----------
         segment : (k,) near the node
         share : (k,) how far along it, to start from
+        slide : mm, how far a node may slide
         """
-        on_edges = self._on_edges(segment, share, nodes)
-        brep = self.tessellation.brep
-        off = brep.edge_tolerance[self.tessellation.segment_edge[segment]] > _OFF
-        points, face = _owned(brep, on_edges.faces, on_edges.uv, off)
-        return Placed(points, on_edges.normals, face, on_edges.crease)
+        edge = self.tessellation.segment_edge[segment]
+        tolerance = self.tessellation.brep.edge_tolerance[edge]
+        t = self._nearest(edge, self._t(segment, share), nodes)
+        places, off = self._at(edge, t)
+        for step in (_SLIDES * slide).tolist():
+            beyond = np.flatnonzero(off > tolerance)
+            if not len(beyond):
+                break
+            tried, off[beyond] = self._at(edge[beyond], self._along(edge[beyond], t[beyond], step))
+            held = off[beyond] <= tolerance[beyond]
+            for target, source in zip(places, tried, strict=True):
+                target[beyond[held]] = source[held]
+        return places
 
     def across(self, segment: Integers, face: Integers) -> Integers:
         """Return the number of the face on the other side of segments, (k,); at a rim the same one."""
@@ -122,22 +131,41 @@ class Lines:
         """Return where points of segments lie in the parameters of a face beside them, (k, 2)."""
         return self._uv(self.tessellation.segment_edge[segment], face, self._t(segment, share))
 
-    def _on_edges(self, segment: Integers, share: Floats, nodes: Floats) -> _OnEdges:
+    def _at(self, edge: Integers, t: Floats) -> tuple[Placed, Floats]:
+        """Return places on edges at their parameters t (k,), and how far the faces beside are from them, (k,) mm."""
+        on_edges = self._on_edges(edge, t)
         brep = self.tessellation.brep
-        edge = self.tessellation.segment_edge[segment]
-        curves = [brep.curves[e] for e in edge.tolist()]
-        rows = zip(curves, self._t(segment, share).tolist(), nodes, strict=True)
-        t = np.array([_closest_on_curve(curve, start, point) for curve, start, point in rows])
-        on_curve = np.array([curve.Value(at).Coord() for curve, at in zip(curves, t.tolist(), strict=True)])
+        points, face, off = owned(brep, on_edges.faces, on_edges.uv, brep.edge_tolerance[edge] > _OFF)
+        return Placed(points, on_edges.normals, face, on_edges.crease), off
+
+    def _nearest(self, edge: Integers, start: Floats, nodes: Floats) -> Floats:
+        """Return the parameters (k,) of the points of edges nearest to nodes (k, 3) mm, from those to start from."""
+        rows = zip(edge.tolist(), start.tolist(), nodes, strict=True)
+        return np.array([_closest_on_curve(self.tessellation.brep.curves[e], at, node) for e, at, node in rows])
+
+    def _along(self, edge: Integers, t: Floats, step: float) -> Floats:
+        """Return the parameters (k,) about `step` mm along edges, or the same ones where that is beyond their ends."""
+        from OCP.gp import gp_Pnt, gp_Vec
+
+        point, velocity, result = gp_Pnt(), gp_Vec(), t.copy()
+        for row, (e, at) in enumerate(zip(edge.tolist(), t.tolist(), strict=True)):
+            curve = self.tessellation.brep.curves[e]
+            curve.D1(at, point, velocity)
+            there = at + step / max(velocity.Magnitude(), 1e-300)
+            if curve.FirstParameter() < there < curve.LastParameter():
+                result[row] = there
+        return result
+
+    def _on_edges(self, edge: Integers, t: Floats) -> _OnEdges:
+        brep = self.tessellation.brep
+        rows = zip(edge.tolist(), t.tolist(), strict=True)
+        on_curve = np.array([brep.curves[e].Value(at).Coord() for e, at in rows]).reshape(-1, 3)
         ends = np.array(
             [(brep.edge_faces[e][0], brep.edge_faces[e][-1]) for e in edge.tolist()], dtype=np.int64
         ).reshape(-1, 2)
-        uvs = [self._border(edge, face, t, on_curve.reshape(-1, 3)) for face in ends.T]
-        gapes = [
-            np.linalg.norm(brep.points_at(f, uv) - on_curve.reshape(-1, 3), axis=1)
-            for f, uv in zip(ends.T, uvs, strict=True)
-        ]
-        second = gapes[1] < gapes[0] - _GAPE
+        uvs = [self._border(edge, face, t, on_curve) for face in ends.T]
+        gapes = [np.linalg.norm(brep.points_at(f, uv) - on_curve, axis=1) for f, uv in zip(ends.T, uvs, strict=True)]
+        second = gapes[1] < gapes[0] - GAPE
         one, other = (brep.normals_at(face, uv) for face, uv in zip(ends.T, uvs, strict=True))
         both = unit(one + other)
         return _OnEdges(
@@ -200,7 +228,7 @@ class Lines:
 
         brep = self.tessellation.brep
         uv = self._uv(edge, face, t)
-        apart = np.flatnonzero(np.linalg.norm(brep.points_at(face, uv) - points, axis=1) > _GAPE)
+        apart = np.flatnonzero(np.linalg.norm(brep.points_at(face, uv) - points, axis=1) > GAPE)
         nearest = t.copy()
         for k in apart.tolist():
             border = BRepAdaptor_Curve(brep.edges[edge[k]], brep.faces[face[k] - 1])
@@ -215,49 +243,6 @@ class Lines:
             brep = self.tessellation.brep
             self._curves[edge, face] = BRepAdaptor_Curve2d(brep.edges[edge], brep.faces[face - 1])
         return self._curves[edge, face]
-
-
-def _owned(brep: Brep, faces: Integers, uv: Floats, off: Booleans) -> tuple[Floats, Integers]:
-    """Return places on the common border of faces, (n, 3) mm, and the numbers (n,) of the faces that own them.
-
-    Parameters
-    ----------
-    faces : (n, k) numbers, the one to prefer first
-    uv : (n, k, 2) parameters of the border on each
-    off : (n,) the edge or the vertex may be elsewhere than the borders
-    """
-    n, k = faces.shape
-    border = brep.points_at(faces.ravel(), uv.reshape(-1, 2)).reshape(n, k, 3)
-    points, face = border[:, 0].copy(), faces[:, 0].copy()
-    doubtful = np.flatnonzero(off | (np.linalg.norm(border - border[:, :1], axis=2).max(axis=1) > _GAPE))
-    met_uv = meeting(brep, border[doubtful].mean(axis=1), faces[doubtful], uv[doubtful])
-    for row, met in zip(doubtful.tolist(), met_uv, strict=True):
-        points[row], face[row] = _between(brep, faces[row], border[row], uv[row], met)
-    return points, face
-
-
-def _between(brep: Brep, faces: Integers, border: Floats, border_uv: Floats, met_uv: Floats) -> tuple[Floats, int]:
-    """Return the place (3,) between faces that gape that is nearest to those that do not own it, and its owner.
-
-    Parameters
-    ----------
-    faces : (k,) numbers, the one to prefer first
-    border : (k, 3) mm, the common border on each
-    border_uv, met_uv : (k, 2) parameters on each of the border and of the place where the surfaces meet
-    """
-    best, place, owner = np.inf, border[0], int(faces[0])
-    for uv in (met_uv, border_uv):
-        for which, number in enumerate(faces.tolist()):
-            at = brep.held(number, uv[which])
-            if at is None:
-                continue
-            feet, feet_uv = brep.project(np.tile(at, (len(faces), 1)), faces, uv)
-            to_border = np.linalg.norm(border - at, axis=1)
-            off = np.where(brep.inside(faces, feet_uv), np.linalg.norm(feet - at, axis=1), to_border)
-            off[which] = 0.0
-            if off.max() < best - _GAPE:
-                best, place, owner = off.max(), at, number
-    return place, owner
 
 
 def _closest_on_curve(curve: Any, start: float, point: Floats) -> float:

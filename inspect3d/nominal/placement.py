@@ -14,6 +14,9 @@ from inspect3d.nominal.tessellation import Tessellation
 SNAP = 0.1
 """A node of a sharp edge or a corner lies nearer to its line than this share of the element size."""
 
+_SLIDE = 0.25
+"""Where faces gape a node may slide along their edge by this share of the element size."""
+
 _NEAR = 0.05
 """Nodes of a face nearer to its border than this share of the element size are looked at twice."""
 
@@ -42,7 +45,8 @@ def placed(tessellation: Tessellation, nodes: Floats, normals: Floats, feature: 
     inside = ~sharp
     inside[corner] = False
     _assign(result, corner, lines.at_vertices(lines.corners[which]))
-    _assign(result, sharp, lines.at_segments(lines.sharp[near.segment[sharp]], near.share[sharp], nodes[sharp]))
+    segment, share = lines.sharp[near.segment[sharp]], near.share[sharp]
+    _assign(result, sharp, lines.at_segments(segment, share, nodes[sharp], _SLIDE * size))
     _assign(result, inside, _on_faces(lines, nodes[inside], normals[inside], size))
     return result
 
@@ -77,7 +81,7 @@ def _on_faces(lines: Lines, nodes: Floats, normals: Floats, size: float) -> Plac
         points[k] = mesh.brep.owned(int(face[k]), uv[k])
 
     result = Placed(points, mesh.brep.normals_at(face, uv), face, np.zeros(len(nodes), dtype=bool))
-    _assign(result, left, lines.at_segments(segment[~reached], share[~reached], feet[left]))
+    _assign(result, left, lines.at_segments(segment[~reached], share[~reached], feet[left], _SLIDE * size))
     return result
 
 

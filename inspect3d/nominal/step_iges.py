@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from inspect3d.nominal.brep import Brep
 from inspect3d.nominal.sewing import sewn
+from inspect3d.nominal.survived import survived
 from inspect3d.outcome import InputError
 
 STEP_SUFFIXES = frozenset({".step", ".stp"})
@@ -105,6 +107,28 @@ def _require_iges(path: Path) -> None:
 
 
 def _transferred(path: Path, is_step: bool) -> Any:
+    """Return what a file holds; the work is left to a child process, for OpenCASCADE crashes on damage it overlooks."""
+    from OCP.BinTools import BinTools
+    from OCP.TopoDS import TopoDS_Shape
+
+    with TemporaryDirectory() as folder:
+        handed = Path(folder) / "shape"
+
+        def hand_over() -> None:
+            whole = BinTools.Write_s(_translated(path, is_step), str(handed.with_suffix(".part")))
+            if whole:
+                handed.with_suffix(".part").rename(handed)
+
+        if not survived(hand_over):
+            raise InputError(f"{path.name} is damaged: OpenCASCADE crashes when it reads it; export it again.")
+        if not handed.exists():
+            return _translated(path, is_step)
+        shape = TopoDS_Shape()
+        BinTools.Read_s(shape, str(handed))
+        return shape
+
+
+def _translated(path: Path, is_step: bool) -> Any:
     from OCP.IFSelect import IFSelect_ReturnStatus
     from OCP.IGESControl import IGESControl_Reader
     from OCP.STEPControl import STEPControl_Reader
