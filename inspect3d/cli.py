@@ -171,6 +171,26 @@ def screenshot(
 
 
 @app.command()
+def pick(
+    recipe: RecipePath,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="Results of the last run, for the candidates of an ambiguous start."),
+    ] = None,
+    host: HostAddress = LOOPBACK,
+    browser: OpenBrowser = True,
+) -> None:
+    """Click in the browser on the same points of the CAD and of photographs or a cloud; saved as landmarks."""
+    from inspect3d.terminal import terminal
+    from inspect3d.web.pick_page import pick_of
+    from inspect3d.web.serve import serve
+
+    with terminal(sys.stderr) as progress, progress.stage("reading the files"):
+        found = pick_of(recipe, out or Path("out") / recipe.stem)
+    serve(found.page, host, browser, typer.echo)
+
+
+@app.command()
 def view(
     out: Annotated[list[Path], typer.Argument(metavar="OUT...", help="Folders of finished inspections.")],
     recipe: Annotated[

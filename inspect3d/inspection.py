@@ -63,7 +63,7 @@ def check(recipe_path: Path) -> list[str]:
         The recipe or one of its files is wrong.
     """
     recipe = load_recipe(recipe_path)
-    nominal = _nominal(recipe)
+    nominal = nominal_of(recipe)
     lines = [
         f"{recipe.part.name}: {recipe.part.cad}, {len(nominal.mesh)} nodes {nominal.mesh.edge_length:.3g} mm apart"
     ]
@@ -78,7 +78,7 @@ def inspect(recipe: Recipe, progress: Progress) -> Record:
         jobs = _jobs(recipe)
         inputs = _inputs(recipe)
     with progress.stage("reading the CAD model"):
-        nominal = _nominal(recipe)
+        nominal = nominal_of(recipe)
     parts = tuple(
         replace(measured(job, recipe, nominal, progress), sources=_sources(recipe, job.table)) for job in jobs
     )
@@ -111,7 +111,8 @@ def _jobs(recipe: Recipe) -> list[Job]:
     return jobs
 
 
-def _nominal(recipe: Recipe) -> Nominal:
+def nominal_of(recipe: Recipe) -> Nominal:
+    """Return the part of a recipe, its surface and its inspection mesh."""
     part = recipe.part
     return load_nominal(recipe.cad, name=part.name, units=part.units, element_size=part.element_size, flip=part.flip)
 

@@ -26,7 +26,7 @@ from inspect3d.record import MeasuredPart, Record
 from inspect3d.summary import summary
 from inspect3d.terminal import terminal
 
-COMMANDS = ("run", "demo", "check", "methods", "screenshot", "view", "virtual", "doctor")
+COMMANDS = ("run", "demo", "check", "methods", "screenshot", "pick", "view", "virtual", "doctor")
 
 
 def inspect3d_command(*arguments: str, **options) -> subprocess.CompletedProcess[str]:

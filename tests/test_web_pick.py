@@ -1,0 +1,134 @@
+"""The page to pick points on, used as a person would: with a mouse and a keyboard, in a browser."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inspect3d.camera import Camera, View
+from inspect3d.inspection import run
+from inspect3d.pose import Pose
+from inspect3d.virtual.stereo_datasets import knowing, milled_stereo
+from inspect3d.virtual.stereo_rig import StereoRig
+from inspect3d.web.pick_page import pick_of
+from tests.browsing import browser, opened, serving
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+NAME = '<script>alert("x")</script> & Block'
+CORNERS = np.array([[0, 70, 20], [0, 0, 20], [86, 0, 22.703], [100, 0, 22.703], [100, 54, 22.703], [100, 70, 6.703]])
+"""Of the milled block, mm; all of them in both pictures and from above."""
+ENLARGED = 12.0
+"""By which a picture is enlarged to click on it."""
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with browser() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def photographs(tmp_path_factory) -> Path:
+    """Return a folder with photographs of the milled block, whose recipe has comments and no landmarks."""
+    folder = tmp_path_factory.mktemp("block")
+    knowing(milled_stereo(0, StereoRig().halved().halved()), None).write(folder, 0)
+    text = re.sub(r"landmarks = \[.*?\n\]\n", "", (folder / "recipe.toml").read_text("utf-8"), flags=re.DOTALL)
+    text = text.replace('name = "Milled block"', f"name = {NAME!r}  # as on the drawing")
+    text = text.replace("element_size = 2.0", "element_size = 8.0")
+    (folder / "recipe.toml").write_text(text + "\n# the end\n", "utf-8")
+    return folder
+
+
+@pytest.fixture
+def recipe(photographs) -> Path:
+    """Return the recipe, as it was before any test."""
+    path = photographs / "recipe.toml"
+    before = path.read_bytes()
+    yield path
+    path.write_bytes(before)
+
+
+def views_of(folder: Path) -> list[View]:
+    """Return the true cameras of a dataset."""
+    cameras = json.loads((folder / "truth.json").read_text("utf-8"))["cameras"]
+    return [
+        View(
+            Camera(np.array(each["matrix"]), np.array(each["distortion"]), tuple(each["size"])),
+            Pose.from_matrix(np.array(each["camera_from_cad"])),
+        )
+        for each in cameras
+    ]
+
+
+def click_on_cad(page, point: np.ndarray) -> None:
+    """Click on a point (3,) mm of the block of 100 x 70 mm, seen from above."""
+    page.click('[data-view="0 0 1"]')
+    box = page.locator("#cad canvas").bounding_box()
+    pixel = max(2.25 * 50 / box["width"], 2.25 * 35 / box["height"])
+    x = box["x"] + box["width"] / 2 + (point[0] - 50) / pixel
+    y = box["y"] + box["height"] / 2 - (point[1] - 35) / pixel
+    page.mouse.click(round(x) + 2, round(y) - 1)
+
+
+def click_in_picture(page, which: int, pixel: np.ndarray, size: tuple[int, int]) -> None:
+    """Turn the wheel over a place of a picture, px, and click on it, to a fraction of a pixel."""
+    canvas = page.locator(".shot canvas").nth(which)
+    canvas.focus()
+    page.keyboard.press("0")
+    box = canvas.bounding_box()
+    scale = min(box["width"] / size[0], box["height"] / size[1])
+    left = box["x"] + (box["width"] - size[0] * scale) / 2
+    top = box["y"] + (box["height"] - size[1] * scale) / 2
+    near = np.round([left + (pixel[0] + 0.5) * scale, top + (pixel[1] + 0.5) * scale])
+    page.mouse.move(*near)
+    page.mouse.wheel(0, -np.log(ENLARGED) / 0.0015)
+    page.wait_for_timeout(100)
+    under = (near - [left, top]) / scale - 0.5
+    at = np.round(near + (pixel - under) * scale * ENLARGED)
+    page.mouse.click(*at)
+
+
+def pick_pairs(page, views: list[View], points: np.ndarray, wrong: dict[int, float] | None = None) -> None:
+    """Pick points on the CAD and in every picture; those in `wrong` that many pixels off in the second."""
+    page.select_option("#snapPicture", "")
+    for k, point in enumerate(points):
+        click_on_cad(page, point)
+        for which, view in enumerate(views):
+            pixel = view.project(point[None])[0] + [(wrong or {}).get(k, 0.0) * which, 0.0]
+            click_in_picture(page, which, pixel, view.camera.size)
+        page.wait_for_selector(f'body[data-pairs="{k + 1}"]')
+
+
+def fitted(page) -> float:
+    """Return the reprojection error of the page, px rms, once it is there."""
+    page.wait_for_selector('body:not([data-rms=""])')
+    return float(page.get_attribute("body", "data-rms"))
+
+
+def test_six_pairs_picked_by_mouse_place_the_cameras_within_a_pixel_and_the_saved_recipe_runs(
+    chromium, photographs, recipe
+):
+    before, views = recipe.read_text("utf-8"), views_of(photographs)
+    with serving(pick_of(recipe, photographs / "out").page) as server, opened(chromium, server) as page:
+        assert page.text_content("#part") == NAME
+        pick_pairs(page, views, CORNERS)
+        assert fitted(page) < 1.0
+        page.screenshot(path=photographs / "six.png")
+        page.click("#save")
+        page.wait_for_selector('body[data-saved="6"]')
+    text = recipe.read_text("utf-8")
+    for line in before.splitlines():
+        assert line in text
+    table = tomllib.loads(text)["measurements"][0]
+    assert np.abs(np.array([row["cad"] for row in table["landmarks"]]) - CORNERS).max() < 1e-3
+    assert [row["name"] for row in table["landmarks"]] == ["P1", "P2", "P3", "P4", "P5", "P6"]
+    (part,) = run(recipe, photographs / "out").parts
+    assert part.status.has_map, part.reason
+    gaps = [found.project(CORNERS) - true.project(CORNERS) for found, true in zip(part.views, views, strict=True)]
+    assert np.sqrt(np.mean(np.square(gaps).sum(axis=2))) < 1.0
