@@ -1,5 +1,7 @@
 """The pieces of a report: digits, colours, viewpoints, flags."""
 
+import base64
+
 import numpy as np
 import pytest
 import trimesh
@@ -13,11 +15,12 @@ from inspect3d.register.alignment import Alignment
 from inspect3d.report.colour_bar import tick_words, ticks
 from inspect3d.report.colours import deviation_scale, rounded_up, symmetric_limits
 from inspect3d.report.compass import round_length
+from inspect3d.report.detail import Detail
 from inspect3d.report.digits import decimals, measured, number, significant
 from inspect3d.report.flags import spread
 from inspect3d.report.scene import scene
 from inspect3d.report.uncertainty import pose_sigma
-from inspect3d.report.viewer import sharp_edges
+from inspect3d.report.viewer import NOTHING, _quantised, sharp_edges
 from inspect3d.report.viewpoint import Viewpoint, around
 from inspect3d.report.views import Views
 
@@ -159,3 +162,30 @@ def test_an_uncertain_turn_grows_with_the_distance_from_its_axis():
     alignment = Alignment(Pose.identity(), 1.0, 0.02, covariance, np.zeros(3), np.ones(3, bool))
     top = ~MESH.crease & (MESH.nodes[:, 2] > 4.9)
     assert pose_sigma(MESH, alignment)[top] == pytest.approx(1e-3 * np.abs(MESH.nodes[top, 0]), abs=1e-12)
+
+
+def test_a_view_with_less_detail_shows_true_nodes_and_the_same_surface():
+    box = trimesh.creation.box((30.0, 20.0, 10.0))
+    fine = trimesh.Trimesh(*trimesh.remesh.subdivide_to_size(box.vertices, box.faces, max_edge=0.6))
+    n = len(fine.vertices)
+    crease = np.isin(np.arange(n), fine.face_adjacency_edges[fine.face_adjacency_angles > 0.5])
+    mesh = InspectionMesh(fine.vertices, fine.faces, fine.vertex_normals, crease, np.full(n, -1))
+    kept = [5, n - 7]
+    detail = Detail.of(mesh, kept, most=1500)
+    assert 500 < len(detail.nodes) <= 1500
+    assert set(kept) <= set(detail.nodes)
+    assert np.array_equal(detail.place[detail.nodes], np.arange(len(detail.nodes)))
+    shown = trimesh.Trimesh(mesh.nodes[detail.nodes], detail.triangles, process=False)
+    assert shown.area == pytest.approx(fine.area, rel=0.02)
+    assert np.linalg.norm(mesh.nodes - mesh.nodes[detail.nodes][detail.place], axis=1).max() < 4 * 1.5
+    assert "of" in detail.words
+    assert Detail.of(mesh).words == ""
+
+
+def test_values_packed_into_two_bytes_keep_their_gaps_and_their_size():
+    values = np.array([-0.5, np.nan, 0.123456, 0.5])
+    packed = _quantised(values)
+    codes = np.frombuffer(base64.b64decode(packed["codes"]), "<u2")
+    assert codes[1] == NOTHING
+    assert packed["low"] + packed["step"] * codes[[0, 2, 3]] == pytest.approx(values[[0, 2, 3]], abs=1e-5)
+    assert np.frombuffer(base64.b64decode(_quantised(np.full(2, np.nan))["codes"]), "<u2").tolist() == [NOTHING] * 2

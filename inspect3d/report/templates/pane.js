@@ -33,7 +33,7 @@ function withUncertainty(value, sigma) {
 
 class Pane {
   /* root: an element that becomes the pane. part: see Surface; and centre, mm, of the CAD frame.
-     told: { start: direction to look from, click(node, pane, event), removed(pin) } */
+     told: { start: direction to look from, click(node, pane, event), hovered(found, pane), removed(pin) } */
   constructor(root, part, eye, look, told) {
     this.part = part;
     this.pins = [];
@@ -53,7 +53,7 @@ class Pane {
     this.surface.after = (pixel) => { this.placePins(); this.placeCompass(); this.placeLength(pixel); };
     const looked = {
       start: told.start,
-      leave: () => { this.probe.hidden = true; this.waiting = null; },
+      leave: () => this.leave(),
       hover: (x, y) => this.hover(x, y),
       click: (x, y, event) => {
         const found = this.surface.hit(x, y);
@@ -107,12 +107,14 @@ class Pane {
   words(node, judged) {
     const [deviation, sigma, third] = this.map.fields, value = deviation.values[node];
     if (!Number.isFinite(value)) return this.part.crease[node] ? "on an edge: no deviation" : "not measured";
-    const verdict = judged && third && third.classes.length && third.values && third.shown[node] ? `, ${third.classes[third.values[node] - 1]}` : "";
+    const verdict = judged && third && third.classes.length && third.values && third.shown[node] ? `, ${third.classes[Math.round(third.values[node]) - 1]}` : "";
+    if (!sigma || !sigma.values) return minus(`${value > 0 ? "+" : ""}${value.toFixed(4)} mm`);
     return withUncertainty(value, sigma.values[node]) + verdict;
   }
   position(node) {
     return this.surface.node(node).map((x, k) => minus((x + this.part.centre[k]).toFixed(2))).join(", ");
   }
+  leave() { this.probe.hidden = true; this.waiting = null; }
   hover(x, y) {
     const asleep = !this.waiting;
     this.waiting = [x, y];
@@ -123,7 +125,13 @@ class Pane {
     });
   }
   showProbe(x, y) {
-    const found = this.surface.hit(x, y), probe = this.probe;
+    const found = this.surface.hit(x, y);
+    this.tell(found, x, y);
+    if (this.told.hovered) this.told.hovered(found, this);
+  }
+  /* Show at a place of the canvas what the map says at a node found; nothing where there is none. */
+  tell(found, x, y) {
+    const probe = this.probe;
     probe.hidden = !found;
     if (!found) return;
     const lines = [made("strong", "", this.words(found.node, true)), made("span", "", `at ${this.position(found.node)} mm`)];
@@ -150,6 +158,12 @@ class Pane {
     this.pins.push(each);
     this.surface.draw();
   }
+  unpin(node, name) {
+    for (const each of this.pins) if (each.node === node && each.name === name) each.flag.remove();
+    this.pins = this.pins.filter((each) => each.flag.isConnected);
+  }
+  /* Give the graphics card back what the pane took of it. */
+  close() { this.surface.close(); }
   placePins() {
     const near = this.surface.eye.turn[2], normals = this.part.normals, taken = [], w = this.canvas.clientWidth, h = this.canvas.clientHeight;
     for (const each of this.pins) {

@@ -61,6 +61,7 @@ class Eye {
     this.changed();
   }
   watch(watcher) { this.watchers.push(watcher); }
+  unwatch(watcher) { this.watchers = this.watchers.filter((each) => each !== watcher); }
   changed() {
     this.moving = true;
     clearTimeout(this.timer);
@@ -155,8 +156,14 @@ class Surface {
     gl.enable(gl.DEPTH_TEST);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     gl.clearColor(1, 1, 1, 1);
-    eye.watch(() => this.draw());
-    new ResizeObserver(() => this.draw()).observe(canvas);
+    this.watcher = () => this.draw();
+    eye.watch(this.watcher);
+    new ResizeObserver(this.watcher).observe(canvas);
+  }
+  close() {
+    this.eye.unwatch(this.watcher);
+    const lose = this.gl && this.gl.getExtension("WEBGL_lose_context");
+    if (lose) lose.loseContext();
   }
   compiled(kind, code) {
     const gl = this.gl, shader = gl.createShader(kind);
