@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from datetime import datetime
 
 import numpy as np
 import pytest
@@ -73,6 +74,11 @@ def test_the_same_report_gives_the_same_bytes(tmp_path):
     front = Chapter("summary", "#panic() *b* _c_ <x> @y \\ ", (Table(("a",), (("b",),), ("text",)),))
     document = Document("# = *", "under", front, ())
     assert pdf(document, tmp_path, MOMENT) == pdf(document, tmp_path, MOMENT)
+
+
+def test_a_moment_between_two_seconds_is_a_moment(tmp_path):
+    document = Document("", "", Chapter("summary", "Summary", ()), ())
+    assert pdf(document, tmp_path, datetime.now().astimezone().replace(microsecond=5)).startswith(b"%PDF")
 
 
 def test_pictures_are_numbered_in_reading_order_wherever_they_stand():

@@ -34,7 +34,7 @@ def pdf(document: Document, folder: Path, moment: datetime) -> bytes:
         font_paths=typst.Fonts(font_paths=[font_folder()]),
         sys_inputs={"content": json.dumps(content, ensure_ascii=False)},
     )
-    made = compiler.compile(format="pdf", timestamp=moment)
+    made = compiler.compile(format="pdf", timestamp=moment.replace(microsecond=0))
     if not isinstance(made, bytes):
         raise TypeError("typst wrote no single PDF")
     return made
