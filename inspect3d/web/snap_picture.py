@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from inspect3d.arrays import Floats
+from inspect3d.arrays import Booleans, Floats, floats
 
 REACH = 12
 """px, how far from the click a corner is looked for."""
-MOST = 0.2
-"""Of the picture, the longest axis of an ellipse."""
+MOST, LEAST_WINDOW = 0.15, 40
+"""Of the picture, and in px: half of the square in which an ellipse is looked for."""
 FIT = 0.04
 """Root mean square distance of an outline from its ellipse, of the shorter half-axis."""
 LEAST_POINTS = 20
@@ -76,30 +77,66 @@ def ellipse_near(grey: Floats, x: float, y: float) -> Snapped | None:
 
     Notes
     -----
-    Outlines at several grey levels about that of the click, and to each the ellipse of A. W. Fitzgibbon, M. Pilu,
-    R. B. Fisher, "Direct least square fitting of ellipses", IEEE PAMI 21 (1999); the one that fits best is taken.
+    Outlines at several grey levels, the middle one first, and to each the ellipse of A. W. Fitzgibbon, M. Pilu,
+    R. B. Fisher, "Direct least square fitting of ellipses", IEEE PAMI 21 (1999). The first that fits is taken, and
+    fitted anew to where the picture is steepest across it.
     """
     import cv2
 
-    half = int(MOST * max(grey.shape) / 2)
+    half = max(int(MOST * max(grey.shape)), LEAST_WINDOW)
     window, left, top = _window(grey, x, y, half)
     smooth = cv2.GaussianBlur(window, (0, 0), 1.5)
     low, high = np.percentile(smooth, [2, 98])
-    best, least = None, FIT
-    for share in np.linspace(0.15, 0.85, 15):
-        mask = (smooth > low + share * (high - low)).astype(np.uint8)
-        outlines, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-        for outline in outlines:
-            if len(outline) < LEAST_POINTS:
-                continue
-            around = cv2.pointPolygonTest(outline, (float(x - left), float(y - top)), False) >= 0
-            misfit, ellipse = _ellipse(outline.reshape(-1, 2).astype(np.float32)) if around else (np.inf, None)
-            if ellipse is not None and misfit < least:
-                best, least = ellipse, misfit
-    if best is None:
+    found = None
+    for share in sorted(np.linspace(0.15, 0.85, 15), key=lambda share: abs(share - 0.5)):
+        found = _around(smooth > low + share * (high - low), float(x - left), float(y - top))
+        if found is not None:
+            break
+    if found is None:
         return None
-    (u, v), (first, second), angle = best
+    (u, v), (first, second), angle = _sharpened(cv2.GaussianBlur(window, (0, 0), 1.0), found)
     return Snapped(float(u + left), float(v + top), (float(first), float(second), float(angle)))
+
+
+def _around(bright: Booleans, x: float, y: float) -> Any:
+    """Return the ellipse that fits an outline around a place best; None where none fits."""
+    import cv2
+
+    best, least = None, FIT
+    outlines, _ = cv2.findContours(bright.astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    for outline in outlines:
+        if len(outline) >= LEAST_POINTS and cv2.pointPolygonTest(outline, (x, y), False) >= 0:
+            misfit, ellipse = _ellipse(outline.reshape(-1, 2).astype(np.float32))
+            if misfit < least:
+                best, least = ellipse, misfit
+    return best
+
+
+def _sharpened(picture: Any, ellipse: Any) -> Any:
+    """Return the ellipse through the places of steepest grey across a first one, to a fraction of a pixel."""
+    import cv2
+
+    (u, v), (first, second), angle = ellipse
+    along, turn = np.linspace(0, 2 * np.pi, 180, endpoint=False), np.radians(angle)
+    axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    on = np.column_stack([np.cos(along) * first / 2, np.sin(along) * second / 2])
+    across = np.column_stack([np.cos(along) * second, np.sin(along) * first])
+    across = (across / np.linalg.norm(across, axis=1, keepdims=True)) @ axes
+    step = np.arange(-3.0, 3.01, 0.25)
+    places = ((u, v) + on @ axes)[:, None] + step[:, None] * across[:, None]
+    x, y = places[..., 0].astype(np.float32), places[..., 1].astype(np.float32)
+    sampled = floats(cv2.remap(picture.astype(np.float32), x, y, cv2.INTER_LINEAR), "grey levels", len(x), None)
+    slope = np.abs(np.gradient(sampled, axis=1))
+    best = slope[:, 1:-1].argmax(axis=1) + 1
+    rows = np.arange(len(best))
+    before, most, after = (slope[rows, best + k] for k in (-1, 0, 1))
+    shift = 0.5 * (before - after) / np.minimum(before - 2 * most + after, -1e-9)
+    inner = (best > 2) & (best < len(step) - 3) & (most > 0.3 * np.median(most))
+    if np.count_nonzero(inner) < len(best) / 2:
+        return ellipse
+    distance = step[best] + 0.25 * np.clip(shift, -1, 1)
+    found = ((u, v) + on @ axes + distance[:, None] * across)[inner]
+    return cv2.fitEllipseDirect(found.astype(np.float32))
 
 
 def _ellipse(points: Floats) -> tuple[float, tuple | None]:

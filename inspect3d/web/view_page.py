@@ -11,11 +11,16 @@ from typing import Any
 import numpy as np
 
 from inspect3d.arrays import Floats
+from inspect3d.compare.compare import Compare
+from inspect3d.compare.comparison import Comparison
+from inspect3d.compare.measured_map import MeasuredMap
+from inspect3d.deviate.deviation import Deviation
+from inspect3d.deviate.errors_file import read_errors
 from inspect3d.nominal.nominal import InspectionMesh
 from inspect3d.nominal.sharp import sides_of
 from inspect3d.outcome import InputError, Status
 from inspect3d.recipe import Recipe, load_recipe
-from inspect3d.report.colours import BACK, UNMEASURED, ColourScale, band_scale
+from inspect3d.report.colours import BACK, UNMEASURED, ColourScale, band_scale, en_classes, en_scale
 from inspect3d.report.finished import Finished, FinishedMap, open_results
 from inspect3d.report.screenshot import field_scale
 from inspect3d.web.coarse import coarse_triangles
@@ -24,10 +29,12 @@ from inspect3d.web.palettes import palettes
 from inspect3d.web.recipe_text import change_recipe, report_table, set_rows
 
 ASSETS = ("view.html", "view.js", "server.js", "profile.js", "surface.js", "pane.js", "pane.css", "page.css")
-SHOWN = ("deviation", "sigma", "verdict", "residual", "en")
+SHOWN = ("deviation", "sigma", "verdict", "residual")
 """Fields in the order of the page; others follow, and `observed` and `crease` are shown as what has no value."""
+AGAINST = ("difference", "en")
+"""Fields of a map against the first one, in one alignment with it."""
 HIDDEN = ("observed", "crease", "Normals")
-TITLES = {"deviation": "deviation", "sigma": "uncertainty (k = 1)", "verdict": "verdict", "en": "Eₙ"}
+TITLES = {"deviation": "deviation", "sigma": "uncertainty (k = 1)", "verdict": "verdict"}
 SHARP = np.radians(30.0)
 
 
@@ -52,6 +59,7 @@ class View:
     finished: Sequence[Finished]
     recipe: Path | None
     _maps: dict[int, FinishedMap] = field(default_factory=dict)
+    _comparisons: dict[int, Comparison] = field(default_factory=dict)
     _lock: RLock = field(default_factory=RLock)
 
     @property
@@ -117,10 +125,10 @@ class View:
 
     def field(self, request: Request) -> Answer:
         """Return the values of a field at the nodes; NaN, or 0 for classes, where there is none."""
-        found = self._map(request.index("map", len(self.shown)))
-        names = self._names(found)
+        index = request.index("map", len(self.shown))
+        names = self._names(index)
         name = names[request.index("field", len(names))]
-        return Answer.arrays(values=self._values(found, name).astype(np.float32))
+        return Answer.arrays(values=self._values(index, name).astype(np.float32))
 
     def save_labels(self, request: Request) -> Answer:
         """Put flags into the recipe.
@@ -148,17 +156,40 @@ class View:
                 self._maps[index] = each.finished.map(each.name)
             return self._maps[index]
 
-    def _names(self, found: FinishedMap) -> list[str]:
+    def _comparison(self, index: int) -> Comparison:
+        """Return the comparison of a map with the first one."""
+        with self._lock:
+            if index not in self._comparisons:
+                mesh = self._map(0).mesh
+                self._comparisons[index] = Compare().pair(self._measured(index), self._measured(0), mesh)
+            return self._comparisons[index]
+
+    def _measured(self, index: int) -> MeasuredMap:
+        each, found = self.shown[index], self._map(index)
+        errors = read_errors(each.finished.folder / f"{each.name}_errors.npz")
+        deviation = Deviation(found.field("deviation"), found.field("sigma"), found.field("observed") > 0)
+        return MeasuredMap(each.name, deviation, errors.covariance, errors.sources)
+
+    def _names(self, index: int) -> list[str]:
         """Return the fields of a map in the order of the page; `tolerance` is the verdict with its side."""
+        found = self._map(index)
         names = [name for name in SHOWN if name in found.fields]
         names += [name for name in found.fields if name not in (*SHOWN, *HIDDEN)]
         if not found.fields["verdict"].any():
             names.remove("verdict")
         elif self.finished[0].values["part"]["tolerance"]:
             names.insert(names.index("verdict"), "tolerance")
-        return names
+        return names + list(AGAINST if index and _same(found.mesh, self._map(0).mesh) else ())
 
-    def _values(self, found: FinishedMap, name: str) -> Floats:
+    def _values(self, index: int, name: str) -> Floats:
+        found = self._map(index)
+        if name in AGAINST:
+            comparison = self._comparison(index)
+            if name == "difference":
+                return comparison.difference
+            if comparison.en is None:
+                raise InputError(comparison.reason)
+            return np.nan_to_num(en_classes(comparison.en))
         if name != "tolerance":
             return found.field(name)
         verdict, deviation = found.field("verdict"), found.field("deviation")
@@ -166,11 +197,16 @@ class View:
         return np.where(verdict == 0, 0, 3 + np.where(deviation < middle, -1, 1) * (verdict - 1))
 
     def _fields(self, index: int) -> list[dict[str, Any]]:
+        return [_described(name, self._scale(index, name), self.shown[0].name) for name in self._names(index)]
+
+    def _scale(self, index: int, name: str) -> ColourScale:
+        if name == "tolerance":
+            return band_scale()
+        if name == "en":
+            return en_scale()
         found = self._map(index)
-        return [
-            _described(name, band_scale() if name == "tolerance" else field_scale(name, found.field(name), found.mesh))
-            for name in self._names(found)
-        ]
+        known = "deviation" if name == "difference" else name
+        return field_scale(known, found.field(known), found.mesh)
 
     def _limits(self) -> list[float] | None:
         recipe = self._loaded()
@@ -239,10 +275,11 @@ def _same(a: InspectionMesh, b: InspectionMesh) -> bool:
     return np.array_equal(a.nodes, b.nodes) and np.array_equal(a.triangles, b.triangles)
 
 
-def _described(name: str, scale: ColourScale) -> dict[str, Any]:
+def _described(name: str, scale: ColourScale, first: str) -> dict[str, Any]:
+    against = {"difference": f"difference to {first}", "en": f"Eₙ against {first}"}
     return {
         "key": name,
-        "title": TITLES.get(name, name),
+        "title": (TITLES | against).get(name, name),
         "unit": scale.unit,
         "limits": list(scale.limits),
         "signed": scale.limits[0] < 0,
