@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from inspect3d.alignment_choice import fitted_to, sensitivity_of
 from inspect3d.arrays import Booleans
 from inspect3d.compare.tolerances import excluded, tolerances
 from inspect3d.compare.verdict import verdict
@@ -18,7 +19,8 @@ from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError, Status
 from inspect3d.pose import Pose
 from inspect3d.progress import Progress
-from inspect3d.recipe import Budget, Coating, MeasurementTable, Recipe, Start
+from inspect3d.recipe import Budget, Coating, MeasurementTable, Recipe
+from inspect3d.recipe_alignment import Start
 from inspect3d.record import MeasuredPart
 from inspect3d.register.alignment import Alignment, NoAlignmentError
 from inspect3d.register.landmarks import landmark_covariance, similarity_from_landmarks
@@ -58,9 +60,10 @@ def measured(job: Job, recipe: Recipe, nominal: Nominal, progress: Progress) -> 
 
 def _registered(measurement: Measurement, table: MeasurementTable, nominal: Nominal) -> tuple[Alignment, ...]:
     start = _start(table.alignment, measurement)
-    register = Register(nominal, start, table.alignment.refine, table.reach, measurement.scale_known)
+    refine = table.alignment.refined and not table.alignment.locked
+    register = Register(nominal, start, refine, table.reach, measurement.scale_known)
     alignments = tuple(register(cloud) for cloud in measurement.clouds)
-    if table.alignment.start == "landmarks" and not table.alignment.refine:
+    if "landmarks" in (table.alignment.start, table.alignment.fit) and not table.alignment.refined:
         cad = np.array([mark.cad for mark in table.alignment.landmarks])
         measured = np.array([mark.measured for mark in table.alignment.landmarks])
         grows = not measurement.scale_known
@@ -70,7 +73,7 @@ def _registered(measurement: Measurement, table: MeasurementTable, nominal: Nomi
 
 def _start(alignment: Start, measurement: Measurement) -> Similarity | None:
     """Return the pose the alignment begins with, or None to search for it."""
-    if alignment.start == "landmarks":
+    if "landmarks" in (alignment.start, alignment.fit):
         return similarity_from_landmarks(
             np.array([mark.measured for mark in alignment.landmarks]),
             np.array([mark.cad for mark in alignment.landmarks]),
@@ -102,7 +105,8 @@ def _of_clouds(
         alignments = _registered(measurement, table, nominal)
     with progress.stage("measuring deviations", table.name):
         deviate = Deviate(
-            refine=table.alignment.refine,
+            refine=table.alignment.refined,
+            fit=fitted_to(table.alignment, nominal.mesh),
             reach=table.reach,
             coating=coating.thickness,
             coating_sigma=coating.sigma,
@@ -111,7 +115,7 @@ def _of_clouds(
         )
         found = deviate(measurement.clouds, alignments, nominal, _counted(recipe, nominal))
     return replace(
-        _judged(ended, found.deviation, found.alignments, recipe, nominal),
+        _judged(ended, found.deviation, found.alignments, table, recipe, nominal, measurement.scale_known),
         covariance=found.covariance,
         points_cad=found.points_cad,
         point_deviation=found.distance,
@@ -132,7 +136,8 @@ def _of_nodes(
     growth, coating = _growth(recipe.report.budget), table.coating or BARE
     with progress.stage("measuring deviations", table.name):
         deviate = DeviateNodes(
-            refine=table.alignment.refine,
+            refine=table.alignment.refined,
+            fit=fitted_to(table.alignment, nominal.mesh),
             reach=table.reach,
             coating=coating.thickness,
             coating_sigma=coating.sigma,
@@ -144,7 +149,7 @@ def _of_nodes(
     if growth:
         remarks = (*remarks, _growth_words("The shape was", growth, recipe.report.budget))
     return replace(
-        _judged(ended, found.deviation, (found.alignment,), recipe, nominal),
+        _judged(ended, found.deviation, (found.alignment,), table, recipe, nominal, measurement.scale_known),
         covariance=found.covariance,
         views=found.views,
         residual=measurement.residual,
@@ -163,8 +168,10 @@ def _judged(
     ended: MeasuredPart,
     deviation: Deviation,
     alignments: tuple[Alignment, ...],
+    table: MeasurementTable,
     recipe: Recipe,
     nominal: Nominal,
+    scale_known: bool,
 ) -> MeasuredPart:
     limits = tolerances(recipe.part, nominal.mesh)
     order = list(Status)
@@ -173,6 +180,7 @@ def _judged(
         status=max((alignment.status for alignment in alignments), key=order.index),
         alignments=alignments,
         deviation=deviation,
+        sensitivity=sensitivity_of(table.alignment, deviation, alignments[0], nominal.mesh, scale_known),
         verdict=None if limits is None else verdict(deviation, limits, recipe.part.probability),
     )
 

@@ -6,7 +6,6 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, field_validator, model_validator
 
 from inspect3d.complaint import complaint
@@ -14,51 +13,27 @@ from inspect3d.file_name import file_name
 from inspect3d.measure import Files
 from inspect3d.outcome import InputError
 from inspect3d.readable import readable
+from inspect3d.recipe_alignment import Start
+from inspect3d.recipe_types import (
+    Direction,
+    Interval,
+    NotNegative,
+    Positive,
+    Region,
+    Table,
+    Text,
+    Unit,
+    Vector,
+    rising,
+)
 
 FILE_KEYS = ("files", "images", "masks", "cameras")
 """The keys of a measurement that name files: one, or a list of them."""
 
 BREP_SUFFIXES = (".step", ".stp", ".iges", ".igs")
 
-Text = Annotated[str, Field(min_length=1, max_length=1000, pattern=r"^[^\x00-\x1f\x7f]+$")]
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Vector = tuple[float, float, float]
-Interval = tuple[float, float]
-Row = tuple[float, float, float, float]
-Unit = Literal["mm", "cm", "m", "um", "inch"]
 
-
-def _rising(interval: Interval | None) -> Interval | None:
-    if interval is not None and not interval[0] < interval[1]:
-        raise ValueError(f"the lower value, {interval[0]:g}, comes first and is below the upper, {interval[1]:g}")
-    return interval
-
-
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Region(_Table):
-    """A part of the part: an axis-aligned box, mm, or faces of the STEP file by number, with its own tolerance."""
-
-    name: str = ""
-    box: tuple[Vector, Vector] | None = None
-    faces: Annotated[tuple[Annotated[int, Field(ge=0)], ...], Field(min_length=1)] | None = None
-    tolerance: Interval | None = None
-
-    _tolerance = field_validator("tolerance")(_rising)
-
-    @model_validator(mode="after")
-    def _one_shape(self) -> Self:
-        if (self.box is None) == (self.faces is None):
-            raise ValueError("give either box = [[x, y, z], [x, y, z]] or faces = [...], one of the two")
-        if self.box and not all(low < high for low, high in zip(*self.box, strict=True)):
-            raise ValueError("the first corner of the box lies below the second in x, y and z")
-        return self
-
-
-class Part(_Table):
+class Part(Table):
     """The part as designed, and what it must keep to."""
 
     name: Text
@@ -71,7 +46,7 @@ class Part(_Table):
     regions: tuple[Region, ...] = ()
     exclude: tuple[Region, ...] = ()
 
-    _tolerance = field_validator("tolerance")(_rising)
+    _tolerance = field_validator("tolerance")(rising)
 
     @model_validator(mode="after")
     def _of_this_model(self) -> Self:
@@ -85,40 +60,11 @@ class Part(_Table):
         return self
 
 
-class Coating(_Table):
+class Coating(Table):
     """Paint on the part when it was measured, mm."""
 
     thickness: NotNegative
     sigma: NotNegative = 0.0
-
-
-class Landmark(_Table):
-    """A point of the CAD and the same point as measured, mm; the name is for people."""
-
-    cad: Vector
-    measured: Vector
-    name: str = ""
-
-
-class Start(_Table):
-    """Where the alignment begins, and whether it is refined."""
-
-    start: Literal["auto", "identity", "landmarks", "pose"] = "auto"
-    matrix: tuple[Row, Row, Row, Row] | None = None
-    landmarks: tuple[Landmark, ...] = ()
-    refine: bool = True
-
-    @model_validator(mode="after")
-    def _complete(self) -> Self:
-        from inspect3d.pose import Pose
-
-        if (self.start == "pose") != (self.matrix is not None):
-            raise ValueError('start = "pose" and matrix = [4 rows of 4 numbers] belong together')
-        if self.start == "landmarks" and len(self.landmarks) < 3:
-            raise ValueError(f'start = "landmarks" needs at least 3 landmarks, and there are {len(self.landmarks)}')
-        if self.matrix is not None:
-            Pose.from_matrix(np.array(self.matrix))
-        return self
 
 
 class MeasurementTable(BaseModel):
@@ -165,28 +111,21 @@ class MeasurementTable(BaseModel):
         return names
 
 
-class Section(_Table):
+class Section(Table):
     """A cutting plane."""
 
     point: Vector
-    normal: Vector
-
-    @field_validator("normal")
-    @classmethod
-    def _points_somewhere(cls, normal: Vector) -> Vector:
-        if not any(normal):
-            raise ValueError("a normal is not zero")
-        return normal
+    normal: Direction
 
 
-class Label(_Table):
+class Label(Table):
     """A named point whose deviation is flagged in the pictures."""
 
     name: Text
     point: Vector
 
 
-class Budget(_Table):
+class Budget(Table):
     """What else adds to the uncertainty: temperature of the part, its expansion, the instrument's calibration."""
 
     temperature: float = 20.0
@@ -194,7 +133,7 @@ class Budget(_Table):
     calibration: NotNegative = 0.0
 
 
-class Report(_Table):
+class Report(Table):
     """What the report shows."""
 
     formats: tuple[Literal["html", "pdf"], ...] = ("html",)
@@ -203,10 +142,10 @@ class Report(_Table):
     labels: tuple[Label, ...] = ()
     budget: Budget = Budget()
 
-    _limits = field_validator("limits")(_rising)
+    _limits = field_validator("limits")(rising)
 
 
-class Recipe(_Table):
+class Recipe(Table):
     """A whole recipe; the names are a contract with other programs."""
 
     schema_: Annotated[Literal[1], Field(alias="schema")]

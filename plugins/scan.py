@@ -11,7 +11,7 @@ import numpy as np
 from inspect3d.files.cloud import CloudFile, read_cloud
 from inspect3d.measure import Cloud, Files, Measurement
 from inspect3d.nominal.nominal import Nominal
-from inspect3d.recipe import Unit
+from inspect3d.recipe_types import Unit
 
 Frames = Literal["one", "separate"]
 _MILLIMETRES: dict[str, float] = {"um": 0.001, "mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4}

@@ -25,7 +25,7 @@ from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import InputError
 from inspect3d.pose import Pose
 from inspect3d.progress import running
-from inspect3d.recipe import Start
+from inspect3d.recipe_alignment import Start
 
 PATCH = 0.125  # of the part's size: length over which the systematic shift of a picture stays alike
 

@@ -62,7 +62,9 @@ def test_every_recipe_in_a_document_is_right(document, bracket):
 
 
 def test_the_reference_names_every_key_of_a_recipe():
-    from inspect3d.recipe import Budget, Coating, MeasurementTable, Part, Recipe, Region, Report, Start
+    from inspect3d.recipe import Budget, Coating, MeasurementTable, Part, Recipe, Report
+    from inspect3d.recipe_alignment import Start
+    from inspect3d.recipe_types import Region
 
     text = (ROOT / "docs" / "recipe.md").read_text(encoding="utf-8")
     for table in (Part, Region, MeasurementTable, Coating, Start, Report, Budget):

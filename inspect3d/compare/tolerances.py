@@ -6,7 +6,8 @@ import numpy as np
 
 from inspect3d.arrays import Booleans, Floats
 from inspect3d.nominal.nominal import InspectionMesh
-from inspect3d.recipe import Part, Region
+from inspect3d.recipe import Part
+from inspect3d.recipe_types import Region
 
 
 def inside(region: Region, points: Floats, face: np.ndarray) -> Booleans:

@@ -13,16 +13,18 @@ from inspect3d.deviate.map_covariance import Independent, MapCovariance, pose_er
 from inspect3d.measure import Cloud
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.nominal.surface import Feet
-from inspect3d.outcome import MeasurementError
+from inspect3d.outcome import MeasurementError, Status
 from inspect3d.register.alignment import Alignment
-from inspect3d.register.gauge import Gauge, best_fit
+from inspect3d.register.fit import Fit
+from inspect3d.register.gauge import Gauge
 from inspect3d.register.icp import TUKEY, median_and_scale
-from inspect3d.register.mobility import jacobian
+from inspect3d.register.mobility import jacobian, named
 from inspect3d.register.similarity import Similarity
 
 FOREIGN = 0.02  # share of the CAD's diagonal beyond which a point is foreign, unless the recipe gives a reach
 SETTLED = 0.02  # share of the usual uncertainty below which the last motion of a node ends the alignment
 LEAST_NODES = 12
+BLOCKS = 3.0  # blocks of the pose covariance along the spread of the nodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +63,7 @@ class Deviate:
     Parameters
     ----------
     to_node : how points become nodes
+    fit : what the common alignment is fitted to
     refine : False keeps the given alignment; its covariance then adds to the map's, S + J C J'
     reach : mm, points farther than this from the CAD are foreign; None: 2 % of the CAD's diagonal
     coating : mm, thickness of paint, subtracted
@@ -70,6 +73,7 @@ class Deviate:
     """
 
     to_node: CloudToNode = field(default_factory=CloudToNode)
+    fit: Fit = field(default_factory=Fit)
     refine: bool = True
     reach: float | None = None
     coating: float = 0.0
@@ -104,7 +108,7 @@ class Deviate:
             fit = self._observe(nominal, feet, moved.turned(normals), noise, counted)
             seen = np.flatnonzero(fit.observed)
             value = fit.value[seen] - self.coating
-            gauge = best_fit(mesh.nodes[seen], mesh.normals[seen], mesh.areas[seen], value, not self.scale_known)
+            gauge = self.fit(mesh, seen, value, not self.scale_known)
             if not self.refine:
                 break
             motion = gauge.motion(value)
@@ -116,6 +120,8 @@ class Deviate:
         distance = np.where(feet.on_rim, np.nan, feet.distance - self.coating)
         distance[np.abs(feet.distance) > (self.reach or np.inf)] = np.nan
         placed = self._aligned(alignments, moved, clouds, distance)
+        if self.fit.kind != "best" or self.fit.locked:
+            placed = tuple(_by_features(each, gauge, value) for each in placed)
         remarks = self._remarks(nominal, feet)
         return CloudDeviation(deviation, covariance, placed, moved(points), distance, fit.noise, remarks)
 
@@ -200,6 +206,14 @@ class Deviate:
                 replace(alignment, cad_from_measured=placed.pose, scale=placed.scale, residual=residual, used=used)
             )
         return tuple(result)
+
+
+def _by_features(alignment: Alignment, gauge: Gauge, value: Floats) -> Alignment:
+    """Return an alignment with the covariance and the free motions of what it was fitted to, for a map (k,) mm."""
+    free = named(gauge.free, gauge.origin, gauge.length)
+    covariance = gauge.covariance(gauge(value), gauge.length / BLOCKS)[:6, :6]
+    status = Status.FREE_MOTIONS if free else alignment.status
+    return replace(alignment, covariance=covariance, origin=gauge.origin, status=status, free=free)
 
 
 def _normals(clouds: tuple[Cloud, ...], alignments: tuple[Alignment, ...]) -> Floats:

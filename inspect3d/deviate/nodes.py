@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,7 +15,8 @@ from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError, Status
 from inspect3d.pose import Pose
 from inspect3d.register.alignment import Alignment
-from inspect3d.register.gauge import Gauge, best_fit
+from inspect3d.register.fit import Fit
+from inspect3d.register.gauge import Gauge
 from inspect3d.register.icp import TUKEY, median_and_scale
 from inspect3d.register.mobility import named
 
@@ -50,6 +51,7 @@ class DeviateNodes:
 
     Parameters
     ----------
+    fit : what the common alignment is fitted to
     refine : False leaves the method's own frame, which must then be the CAD's
     reach : mm, a node that moved farther is not observed
     coating : mm, thickness of paint, subtracted
@@ -57,6 +59,7 @@ class DeviateNodes:
     growth : relative, by which the part was larger when it was measured than at the reference temperature
     """
 
+    fit: Fit = field(default_factory=Fit)
     refine: bool = True
     reach: float | None = None
     coating: float = 0.0
@@ -95,7 +98,7 @@ class DeviateNodes:
                 "the part, or its speckle is too poor for this element_size."
             )
         node = measured.node[seen]
-        gauge = best_fit(mesh.nodes[node], mesh.normals[node], mesh.areas[node], value[seen], not measured.scale_known)
+        gauge = self.fit(mesh, node, value[seen], not measured.scale_known)
         modes = gauge.jacobian if self.refine else np.zeros((len(node), 0))
         solver = gauge.solver if self.refine else np.zeros((0, len(node)))
         motion = gauge.motion(value[seen]) if self.refine else np.zeros(gauge.jacobian.shape[1])

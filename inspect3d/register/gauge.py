@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy import linalg, sparse
 
 from inspect3d.arrays import Floats, floats
-from inspect3d.register.mobility import jacobian, spread
+from inspect3d.register.mobility import cross_matrix, jacobian, spread
+from inspect3d.register.ordered import Level, ordered_solver
 
 MAD = 1.4826
 TUKEY = 4.685
@@ -32,6 +34,8 @@ class Gauge:
     weights : (n,) W, area times robust weight
     offset : mm, uniform deviation that no rigid motion explains; 0 unless it is far larger than the other deviations
     growth : take out the growth of the part as well
+    levels : features that determine the motion one after the other, as datums do; empty: all nodes by their weights
+    locked : of the six motions about the CAD's origin (rx, ry, rz, tx, ty, tz), those not to be made, by number
     """
 
     nodes: Floats
@@ -39,6 +43,8 @@ class Gauge:
     weights: Floats
     offset: float = 0.0
     growth: bool = False
+    levels: tuple[Level, ...] = ()
+    locked: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", floats(self.weights, "weights", len(self.nodes)))
@@ -77,6 +83,28 @@ class Gauge:
         return values, vectors / self._units[:, None]
 
     @cached_property
+    def _ordered(self) -> tuple[Floats, Floats, list[int]]:
+        """The solver, the free motions as columns, and how many motions each level determines."""
+        whole = Level(sparse.identity(len(self.nodes), format="csr"), self.weights)
+        solver, free, taken = ordered_solver(self.jacobian / self._units, self.levels or (whole,), self._allowed)
+        return solver / self._units[:, None], free / self._units[:, None], taken
+
+    @cached_property
+    def _allowed(self) -> Floats:
+        """A basis of the motions that are not locked, orthonormal columns in units of `length`."""
+        about_origin = np.eye(len(self._units))
+        if not self.locked:
+            return about_origin
+        about_origin[3:6, :3] = cross_matrix(self.origin)  # of the translation at the CAD's origin, t - r x o
+        about_origin[3:6, 6:] = -self.origin[:, None]
+        return linalg.null_space(about_origin[list(self.locked)] / self._units)
+
+    @property
+    def determined(self) -> list[int]:
+        """Return how many motions each of the levels determines."""
+        return self._ordered[2]
+
+    @cached_property
     def free(self) -> Floats:
         """Return the motions that change no deviation, (k, 6), rad and mm about `origin`; k may be 0.
 
@@ -85,6 +113,8 @@ class Gauge:
         """
         if self.growth:
             return replace(self, growth=False).free
+        if self.levels or self.locked:
+            return self._ordered[1].T
         values, vectors = self._spectrum
         return vectors[:, values < FREE * values[-1]].T
 
@@ -112,6 +142,8 @@ class Gauge:
     @cached_property
     def solver(self) -> Floats:
         """Return M = (J' W J)⁺ J' W, (6, n) or with growth (7, n): the motion in a deviation field."""
+        if self.levels or self.locked:
+            return self._ordered[0]
         return self.inverse @ (self.jacobian * self.weights[:, None]).T
 
     def motion(self, values: Floats) -> Floats:
@@ -120,6 +152,8 @@ class Gauge:
         A part that is too large all over, as a ring of too large a diameter, would lean over to fit the better: the
         `offset` it has left when the stiff motions are made does not count for the soft ones.
         """
+        if self.levels or self.locked:
+            return -self.solver @ values
         soft = self.inverse - self._inverse(SOFT)
         return -self.solver @ values + self.offset * soft @ (self.jacobian.T @ self.weights)
 
@@ -144,14 +178,14 @@ class Gauge:
         K.-Y. Liang & S. L. Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73 (1986),
         with the usual factor b / (b - p) for b blocks and p determined motions.
         """
-        scores = self.jacobian * (self.weights * residuals)[:, None]
+        scores = self.solver.T * residuals[:, None]
         cells = np.floor((self.nodes - self.nodes.min(axis=0)) / block).astype(np.int64)
         _, cell = np.unique(cells, axis=0, return_inverse=True)
         sums = np.stack([np.bincount(cell.ravel(), scores[:, k]) for k in range(scores.shape[1])], axis=1)
-        determined = np.linalg.matrix_rank(self.inverse)
+        determined = np.linalg.matrix_rank(self.solver * self._units[:, None])
         blocks = len(sums)
         grow = blocks / max(blocks - determined, 1)
-        return grow * self.inverse @ (sums.T @ sums) @ self.inverse
+        return grow * sums.T @ sums
 
 
 def best_fit(

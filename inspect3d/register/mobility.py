@@ -80,14 +80,15 @@ def _turn(scaled: Floats, origin: Floats, length: float) -> FreeMotion:
 def _turns_about_a_point(turns: Floats, origin: Floats, length: float) -> list[FreeMotion]:
     """Return the three turns about the common point of a sphere."""
     rotations, translations = turns[:, :3] / length, turns[:, 3:]
-    cross = np.concatenate([_cross_matrix(rotation) for rotation in rotations])
+    cross = np.concatenate([cross_matrix(rotation) for rotation in rotations])
     point = np.linalg.lstsq(-cross, translations.ravel(), rcond=None)[0]
     words = f"turn about the axis along {{}} through {_vector(origin + point, 1)} mm"
     axes = np.eye(3)
     return [FreeMotion(words.format(_vector(a, 0)), np.concatenate([a, -np.cross(a, point)])) for a in axes]
 
 
-def _cross_matrix(vector: Floats) -> Floats:
+def cross_matrix(vector: Floats) -> Floats:
+    """Return the matrix (3, 3) of v -> vector x v."""
     x, y, z = vector
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 

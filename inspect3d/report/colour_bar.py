@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from inspect3d.arrays import Floats
-from inspect3d.recipe import Interval
+from inspect3d.recipe_types import Interval
 from inspect3d.report.canvas import INK, PALE, Canvas
 from inspect3d.report.colours import UNMEASURED, ColourScale
 from inspect3d.report.digits import number

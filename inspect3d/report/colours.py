@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from inspect3d.arrays import Floats
 from inspect3d.deviate.statistics import percentiles
-from inspect3d.recipe import Interval
+from inspect3d.recipe_types import Interval
 
 UNMEASURED = (158, 161, 166)
 BACK = (111, 118, 131)

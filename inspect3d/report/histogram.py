@@ -8,7 +8,7 @@ import numpy as np
 
 from inspect3d.arrays import Floats
 from inspect3d.deviate.statistics import Statistics
-from inspect3d.recipe import Interval
+from inspect3d.recipe_types import Interval
 from inspect3d.report.canvas import INK, PALE, Canvas
 from inspect3d.report.colour_bar import tick_words, ticks
 from inspect3d.report.colours import ColourScale

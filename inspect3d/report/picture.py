@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inspect3d.nominal.nominal import InspectionMesh
-from inspect3d.recipe import Interval
+from inspect3d.recipe_types import Interval
 from inspect3d.report.canvas import PALE, Canvas
 from inspect3d.report.colour_bar import draw_colour_bar
 from inspect3d.report.colours import ColourScale

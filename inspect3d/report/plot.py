@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inspect3d.arrays import Floats
-from inspect3d.recipe import Interval
+from inspect3d.recipe_types import Interval
 from inspect3d.report.canvas import INK, Canvas
 from inspect3d.report.colour_bar import tick_words, ticks
 

@@ -13,6 +13,7 @@ import numpy as np
 from inspect3d.camera import View
 from inspect3d.compare.comparison import Comparison
 from inspect3d.compare.deviation_region import DeviationRegion
+from inspect3d.compare.sensitivity import Sensitivity
 from inspect3d.compare.tolerances import tolerances
 from inspect3d.deviate.statistics import Statistics, percentiles
 from inspect3d.nominal.nominal import InspectionMesh
@@ -96,6 +97,7 @@ def _measurement(record: Record, mesh: InspectionMesh, part: MeasuredPart) -> di
         "verdict": verdict_shares(record, part) if has_map else None,
         "labels": [_label(reading) for reading in readings(mesh, part, record.recipe.report.labels)],
         "noise": part.noise,
+        "sensitivity": _sensitivity(part.sensitivity) if part.sensitivity else None,
         "hidden": list(part.hidden),
         "contributions": [list(each) for each in part.contributions],
         "cameras": [_camera(view) for view in part.views],
@@ -143,6 +145,22 @@ def candidates(part: MeasuredPart) -> tuple[Candidate, ...]:
     if part.candidates:
         return part.candidates
     return part.alignments[0].candidates if part.alignments else ()
+
+
+def _sensitivity(found: Sensitivity) -> dict[str, Any]:
+    return {
+        "chosen": found.chosen,
+        "others": [
+            {
+                "alignment": other.words,
+                "motion": other.motion.tolist(),
+                "origin": other.origin.tolist(),
+                "largest_shift": float(np.abs(other.shift).max()),
+            }
+            for other in found.others
+        ],
+        "remarks": list(found.remarks),
+    }
 
 
 def _candidate(candidate: Candidate) -> dict[str, Any]:

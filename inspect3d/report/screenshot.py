@@ -9,7 +9,7 @@ import numpy as np
 from inspect3d.arrays import Floats
 from inspect3d.nominal.nominal import InspectionMesh
 from inspect3d.outcome import InputError
-from inspect3d.recipe import Interval
+from inspect3d.recipe_types import Interval
 from inspect3d.report.colours import (
     ColourScale,
     deviation_scale,

@@ -68,7 +68,7 @@ def _of_the_points(record: Record, part: MeasuredPart) -> list[Contribution]:
         words = "median of what the covariance of the pose means at a node; "
         words += (
             "for comparison: the map is known up to a best fit to the same points, and so are its uncertainties"
-            if _table(record, part).alignment.refine
+            if _table(record, part).alignment.refined
             else "shared by all nodes"
         )
         found.append(Contribution("alignment", _micro(float(np.median(sigma))), words))
