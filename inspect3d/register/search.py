@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,11 @@ from inspect3d.register.field import Field
 from inspect3d.register.similarity import Similarity
 from inspect3d.register.thinned import Thinned
 
+Judge = Callable[[Floats, Floats, Floats], Floats]
+"""What else is known of poses, given as rotations (k, 3, 3), translations (k, 3) and scales (k,): a cost of each, (k,)
+"""
+
+LIKELY = 20  # guesses that are also judged by what else is known, for each one kept
 AT_ONCE = 80_000  # guesses, so that they fit into memory
 MARGIN = 1.2  # by which a scale may leave its bounds in the descent
 
@@ -50,8 +56,15 @@ class PoseSearch:
     apart: float = 0.03
     seed: int = 0
 
-    def __call__(self, cloud: Thinned, surface: Surface, field: Field) -> list[Similarity]:
-        """Return the poses cad_from_cloud found, best first."""
+    def __call__(
+        self, cloud: Thinned, surface: Surface, field: Field, judge: Judge | None = None
+    ) -> list[Similarity]:
+        """Return the poses cad_from_cloud found, best first.
+
+        Parameters
+        ----------
+        judge : what else is known; its costs are added to the share of points off the surface
+        """
         from inspect3d.register.search_kernel import costs, descend
 
         random = np.random.default_rng(self.seed)
@@ -65,6 +78,10 @@ class PoseSearch:
                 rotations, translations, sizes, cloud.points[judges], cloud.normals[judges], cloud.oriented,
                 self.near * size, *grid,
             )  # fmt: skip
+            if judge is not None:
+                likely = np.argsort(rank)[: LIKELY * self.kept]
+                rotations, translations, sizes = rotations[likely], translations[likely], sizes[likely]
+                rank = rank[likely] + judge(rotations, translations, sizes)
             best = np.argsort(rank)[: self.kept]
             parts.append((rank[best], rotations[best], translations[best], sizes[best]))
         rank, rotations, translations, sizes = (np.concatenate(values) for values in zip(*parts, strict=True))
@@ -83,6 +100,8 @@ class PoseSearch:
         rank = costs(
             rotations, translations, sizes, cloud.points, cloud.normals, cloud.oriented, self.near / 3 * size, *grid
         )
+        if judge is not None:
+            rank = rank + judge(rotations, translations, sizes)
         order = np.argsort(rank)
         poses = [Similarity(Pose(rotations[k], translations[k]), float(sizes[k])) for k in order]
         return distinct(poses, cloud.points, self.apart * size)

@@ -9,6 +9,8 @@ import numpy as np
 from inspect3d.arrays import Booleans, Floats
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
+from inspect3d.pose import Pose
+from inspect3d.register.similarity import Similarity
 
 FIRM, STIFF = 1e-9, 1e-4  # damping at first and after a refused step, as a share of the normal matrix's diagonal
 STEADY = 1e-5
@@ -81,6 +83,15 @@ class Bundle:
     def chosen(self, which: Booleans) -> Bundle:
         """Return the same cameras with some of the points."""
         return replace(self, points=self.points[which], pixels=self.pixels[which])
+
+    def placed(self, cad_from_bundle: Similarity) -> Bundle:
+        """Return cameras and points in the CAD frame, at its size."""
+        back, scale = cad_from_bundle.pose.inverse(), cad_from_bundle.scale
+        views = []
+        for view in self.views:
+            before = view.camera_from_cad
+            views.append(replace(view, camera_from_cad=Pose(before.rotation, scale * before.translation) @ back))
+        return replace(self, views=tuple(views), points=cad_from_bundle(self.points))
 
     def settled(self, noise: float) -> Bundle:
         """Return the same cameras, the points where they appear nearest to where they were found."""

@@ -1,0 +1,130 @@
+"""The decision where the part is: found, one of several, or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from inspect3d.arrays import Floats
+from inspect3d.camera import View
+from inspect3d.register.choice import choose
+from inspect3d.register.icp import Fit
+from inspect3d.register.landmarks import pose_from_landmarks
+from inspect3d.register.similarity import Similarity
+from inspect3d.register.smooth import Smooth
+from inspect3d.starting.agreement import Agreement
+from inspect3d.starting.fitting import Fitted
+
+ON = 2e-3  # share of the CAD's diagonal within which a point lies on it
+BELIEVED = 0.7  # least share of the points before the CAD that lie on it, and of its surface on which pictures agree
+WORSE = 0.15  # share by which agreement or outline must fall behind to rule a start out
+APART = 0.03  # share of the diagonal below which two starts are the same
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A start that was refined, and what speaks for it.
+
+    Parameters
+    ----------
+    fit : cameras and points on the CAD
+    agreement : of the pictures on the nominal surface
+    bareness : share of the part that would appear where the pictures show nothing
+    explained : share of the points before the CAD that lie on it
+    count : of the points that lie on it
+    """
+
+    fit: Fitted
+    agreement: Agreement
+    bareness: float
+    explained: float
+    count: int
+
+    @property
+    def views(self) -> tuple[View, ...]:
+        """Return the cameras before the part."""
+        return self.fit.bundle.views
+
+    @property
+    def believed(self) -> bool:
+        """Tell whether points and pictures both lie on the CAD."""
+        return min(self.explained, self.agreement.share) >= BELIEVED
+
+    @property
+    def merit(self) -> float:
+        """Return what speaks for the start as one number, 0 to 1."""
+        return self.explained * self.agreement.share * (1 - self.bareness)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What the trials say.
+
+    Parameters
+    ----------
+    trials : those that the data cannot tell apart, best first; of equivalent ones only the best
+    symmetric : whether the part looks the same in other places
+    best : what came nearest, where there is none
+    """
+
+    trials: tuple[Trial, ...]
+    symmetric: bool
+    best: Trial
+
+
+def answer(trials: Sequence[Trial], smooth: Smooth) -> Answer:
+    """Return which of the trials, all of the same points, the data choose.
+
+    A trial that the pictures contradict is ruled out by their agreement on the nominal surface, or by its outline; the
+    rest are compared point by point, see `choose`. Those that a symmetry of the CAD or a free motion makes equal are
+    one: of the symmetric ones that with the smallest rotation before the first camera, else the best.
+    """
+    ranked = sorted(trials, key=lambda trial: -trial.merit)
+    best = ranked[0]
+    if not best.believed:
+        return Answer((), False, best)
+    kept: list[Trial] = []
+    for trial in ranked:
+        behind = best.agreement.share - trial.agreement.share, trial.bareness - best.bareness
+        if max(behind) < WORSE and all(_apart(trial, other, smooth) for other in kept):
+            kept.append(trial)
+    fits = [_as_fit(trial, kept[0], smooth) for trial in kept]
+    choice = choose(fits, smooth, kept[0].fit.bundle.points)
+    of = {id(fit): trial for fit, trial in zip(fits, kept, strict=True)}
+    equal = sorted((of[id(fit)] for fit in choice.equivalent), key=lambda trial: -trial.merit)
+    chosen = of[id(choice.fit)] if choice.by_symmetry else equal[0]
+    rivals = tuple(of[id(fit)] for fit in choice.rivals if of[id(fit)].believed)
+    return Answer((chosen, *rivals), choice.by_symmetry, best)
+
+
+def _apart(one: Trial, other: Trial, smooth: Smooth) -> bool:
+    away = one.fit.bundle.points - other.fit.bundle.points
+    return bool(np.sqrt((away**2).sum(axis=1).mean()) > APART * smooth.surface.diagonal)
+
+
+def _as_fit(trial: Trial, first: Trial, smooth: Smooth) -> Fit:
+    """Return a trial as a fit of the points as the first trial has them."""
+    points, agrees = trial.fit.bundle.points, trial.fit.agrees
+    pose = pose_from_landmarks(first.fit.bundle.points, points)
+    part = agrees & ~trial.fit.feet.on_rim
+    scale = float(np.median(np.abs(trial.fit.feet.distance[part]))) if part.any() else smooth.surface.diagonal
+    return Fit(Similarity(pose), trial.fit.feet, agrees, 1.4826 * scale)
+
+
+def explained(fit: Fitted, smooth: Smooth) -> tuple[float, int]:
+    """Return the share of the points before the CAD that lie on it, and their count.
+
+    A point is before or behind the CAD if the line of sight of a camera through it meets the CAD anywhere; others are
+    background.
+    """
+    surface, points = smooth.surface, fit.bundle.points
+    on = fit.distance < ON * surface.diagonal
+    meets = np.zeros(len(points), bool)
+    for k, view in enumerate(fit.bundle.views):
+        seen = np.flatnonzero(fit.bundle.seen[:, k])
+        sights: Floats = points[seen] - view.centre
+        meets[seen] |= surface.first_hit(view.centre, sights).triangle >= 0
+    count = int(np.count_nonzero(on))
+    return count / max(int(np.count_nonzero(meets | on)), 1), count

@@ -1,0 +1,93 @@
+"""Cameras and tracks fitted to the CAD: the points of the tracks come to lie on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inspect3d.arrays import Booleans, Floats
+from inspect3d.camera import View
+from inspect3d.correlation.freedom import Freedom
+from inspect3d.nominal.surface import Feet, Surface
+from inspect3d.starting.bundle import Bundle, Planes, adjusted
+
+WIDTHS = (0.02, 0.012, 0.008, 0.005, 0.003, 0.002, 0.001, 0.0007, 0.0005, 0.0005)
+"""Shares of the CAD's diagonal that points may be off it, from the first fit to the last."""
+OPPOSED = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A bundle on the CAD.
+
+    Parameters
+    ----------
+    bundle : cameras and points in the CAD frame
+    feet : of the points on the nominal surface
+    agrees : (n,), the normal there fits that of the points around
+    """
+
+    bundle: Bundle
+    feet: Feet
+    agrees: Booleans
+
+    @property
+    def distance(self) -> Floats:
+        """Return the distance of each point from the CAD, (n,) mm; infinite off its rim, and on its wrong side."""
+        return np.where(self.agrees & ~self.feet.on_rim, np.abs(self.feet.distance), np.inf)
+
+
+def fitted(
+    bundle: Bundle,
+    normals: Floats,
+    surface: Surface,
+    freedom: Callable[[tuple[View, ...]], Freedom],
+    noise: float,
+) -> Fitted:
+    """Return cameras and points fitted to the CAD, from coarse to fine.
+
+    In turn the foot of each point is found on the CAD, and cameras and points are adjusted so that the points come to
+    lie on the tangent planes there; how far they may be off shrinks. Points far off take no part: they are background,
+    or where the part differs.
+
+    Parameters
+    ----------
+    bundle : in the CAD frame, nearly
+    normals : (n, 3), unit, of the points, towards the cameras; zero where unknown
+    freedom : what may change about cameras at given places
+    noise : px, of a feature's place
+    """
+    turned = normals
+    for share in WIDTHS:
+        there = _on(bundle, turned, surface)
+        width = share * surface.diagonal
+        usable = (there.distance < 4 * width)[:, None]
+        planes = Planes(there.feet.points, np.where(usable, there.feet.normals, 0.0), width)
+        before = bundle
+        bundle = adjusted(bundle, freedom(bundle.views), noise, planes, steps=4).bundle
+        turn = bundle.views[0].camera_from_cad.rotation.T @ before.views[0].camera_from_cad.rotation
+        turned = turned @ turn.T
+    return _on(bundle, turned, surface)
+
+
+def _on(bundle: Bundle, normals: Floats, surface: Surface) -> Fitted:
+    feet = surface.closest(bundle.points)
+    cosine = np.einsum("ni,ni->n", normals, feet.normals)
+    return Fitted(bundle, feet, (cosine > OPPOSED) | ~normals.any(axis=1))
+
+
+def with_all(fit: Fitted, whole: Bundle, normals: Floats, surface: Surface, noise: float) -> Fitted:
+    """Return the fitted cameras with all the tracks of another bundle.
+
+    Parameters
+    ----------
+    whole : its points, in the frame in which `normals` are, start where the tracks are looked for
+    """
+    first, old = fit.bundle.views[0].camera_from_cad, whole.views[0].camera_from_cad
+    scale = np.median(first(fit.bundle.points)[:, 2]) / np.median(old(whole.points)[:, 2])
+    points = first.inverse()(scale * old(whole.points))
+    bundle = replace(whole, views=fit.bundle.views, points=points).settled(noise)
+    turned = normals @ (first.rotation.T @ old.rotation).T
+    return _on(bundle, turned, surface)
