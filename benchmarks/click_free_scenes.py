@@ -110,9 +110,7 @@ def random_scene(seed: int) -> RandomScene:
     scale = fill * float(np.min(SIZE / (high - low)))
     along = corners @ toward
     target = (low + high) / 2 @ np.stack([np.cross(up, toward), up]) + (along.min() + along.max()) / 2 * toward
-    rig = StereoRig(
-        cameras, angle, scale, true, SIZE, toward=tuple(toward), up=tuple(up), offset=3.0, spread=0.002
-    )
+    rig = StereoRig(cameras, angle, scale, true, SIZE, toward=tuple(toward), up=tuple(up), offset=3.0, spread=0.002)
     views = rig(target, seed)
     scene = Scene(shape, FORM, Speckle(dot=DOT / scale, seed=seed))
     grey = []

@@ -52,7 +52,9 @@ def measured(job: Job, recipe: Recipe, nominal: Nominal, progress: Progress) -> 
         else:
             ended = _of_clouds(ended, measurement, table, recipe, nominal, progress)
     except NoAlignmentError as error:
-        ended = replace(ended, status=error.status, reason=str(error), candidates=error.candidates)
+        ended = replace(
+            ended, status=error.status, reason=str(error), candidates=error.candidates, figures=error.figures
+        )
     except MeasurementError as error:
         ended = replace(ended, reason=str(error))
     return replace(ended, seconds=dict(progress.seconds[table.name]))

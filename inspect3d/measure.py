@@ -123,6 +123,7 @@ class NodalMeasurement:
     cad_from_measured : where the method found the part in the frame of its instrument
     placed : whether the instrument's frame was known to be the CAD's, so that a rigid motion in `value` is measured
     scale_known : False where the method cannot tell a larger part from a smaller one
+    symmetric : whether the part would look the same in another place, of which the method took one
     views : the cameras in the CAD frame, if it has any
     residual : (n,) normalised grey-level residual at every node of the mesh, NaN where there is none
     hidden : the motions that the data cannot tell, in words
@@ -138,6 +139,7 @@ class NodalMeasurement:
     cad_from_measured: Pose
     placed: bool = False
     scale_known: bool = True
+    symmetric: bool = False
     views: tuple[View, ...] = ()
     residual: Floats | None = None
     hidden: tuple[str, ...] = ()

@@ -116,7 +116,8 @@ class Stereocorrelation:
         sizes = tuple(photograph.size for photograph in photographs)
         calibration = files.paths.get("cameras", ())
         rig = load_calibration(calibration, tuple(p.name for p in photographs), sizes) if calibration else None
-        self._require_start(rig, len(photographs))
+        self._require_start(rig)
+        self._require_focal(rig, photographs)
         remarks = tuple(
             f"{photograph.name} asks viewers to turn it; its pixels are counted as it is stored, unturned."
             for photograph in photographs
@@ -132,11 +133,8 @@ class Stereocorrelation:
         MeasurementError
             The landmarks do not fit, the pictures do not show the part twice, or they do not agree.
         """
-        start, nodes = self._start(), nominal.mesh.nodes
-        if source.rig is not None:
-            begin = start.calibrated(source.rig, nodes)
-        else:
-            begin = start.uncalibrated(source.photographs, self._focals(len(source.photographs)), nodes)
+        start = self._start()
+        begin = start(source.photographs, source.masks, source.rig, self._focals(len(source.photographs)), nominal)
         grey = [photograph.grey for photograph in source.photographs]
         steps: list[Step] = []
         correlate = self._correlate(nominal)
@@ -152,11 +150,12 @@ class Stereocorrelation:
             cad_from_measured=cad_from_rig,
             placed=begin.freedom.poses == "known",
             scale_known=begin.freedom.poses != "free",
+            symmetric=begin.symmetric,
             views=shape.views,
             residual=shape.residual,
             hidden=tuple(motion.words for motion in shape.hidden),
             contributions=contributions(shape),
-            figures=illustrated(nominal, shape, begin.views, grey, steps, start.picks),
+            figures=(*begin.figures, *illustrated(nominal, shape, begin.views, grey, steps, start.picks)),
             remarks=(*source.remarks, *begin.remarks, *remarks(shape, begin.freedom)),
         )
 
@@ -196,22 +195,25 @@ class Stereocorrelation:
             raise InputError(f"`masks` names {len(paths)} files for {len(photographs)} pictures: give one for each.")
         return tuple(read_mask(path, photograph.size) for path, photograph in zip(paths, photographs, strict=True))
 
-    def _require_start(self, rig: Rig | None, count: int) -> None:
+    def _require_start(self, rig: Rig | None) -> None:
         placed = rig is not None and (rig.camera_from_cad or (rig.camera_from_rig and self.alignment.start != "auto"))
         if not (placed or self.alignment.refine):
             raise InputError(
                 "refine = false keeps the part in the place it is said to have, and nothing says it: name `cameras` "
                 "with their camera_from_cad, give alignment.start, or leave refine away."
             )
-        if placed or len(self.landmarks) >= FEWEST:
-            return
-        if self.landmarks:
+        if self.landmarks and len(self.landmarks) < FEWEST and not placed:
             raise InputError(f"There are {len(self.landmarks)} landmarks, and {FEWEST} or more are needed: pick more.")
-        how = 'the pose of the part (alignment = { start = "pose", matrix = ... })' if rig else "`cameras`"
-        raise InputError(
-            f"Nothing tells where the cameras stand before the part: add {FEWEST} or more `landmarks` with their "
-            f"pixels in the {count} pictures, or {how}."
-        )
+
+    def _require_focal(self, rig: Rig | None, photographs: tuple[Photograph, ...]) -> None:
+        if rig is not None or self.landmarks:
+            return
+        for photograph, focal in zip(photographs, self._focals(len(photographs)), strict=True):
+            if focal is None and photograph.focal is None:
+                raise InputError(
+                    f"Nothing tells the focal length of {photograph.name}: give a rough `focal`, px (that of the lens, "
+                    "mm, over the width of a pixel, mm), `cameras`, or 6 or more `landmarks` with their pixels."
+                )
 
     def _start(self) -> StereoStart:
         matrix = self.alignment.matrix
@@ -219,8 +221,10 @@ class Stereocorrelation:
         if self.landmarks:
             cad, pixels = [p.cad for p in self.landmarks], [p.pixels for p in self.landmarks]
             picks = Picks(np.array(cad, float), np.array(pixels, float))
-        rig_from_cad = Pose.identity() if matrix is None else Pose.from_matrix(np.array(matrix)).inverse()
-        return StereoStart(picks, rig_from_cad, self.alignment.refine)
+        place = None if matrix is None else Pose.from_matrix(np.array(matrix))
+        if self.alignment.start == "identity":
+            place = Pose.identity()
+        return StereoStart(picks, place, self.alignment.refine)
 
 
 def _telling(steps: list[Step]) -> Callable[[Step], None]:

@@ -275,8 +275,7 @@ def test_a_flat_part_with_free_lenses_claims_no_more_than_it_tells(tmp_path, vie
 @pytest.mark.parametrize(
     ("measurement", "says"),
     [
-        ("", "Nothing tells where the cameras stand before the part: add 4 or more `landmarks`"),
-        ('cameras = "rig.json"', "the pose of the part"),
+        ("", "Nothing tells the focal length of left.png: give a rough `focal`"),
         ('cameras = "part.ply"', "is no calibration that inspect3d reads"),
         ("landmarks = [{ cad = [0, 0, 0], pixels = [[1, 2]] }]", "Landmark 1 has 1 pixels for 2 pictures"),
         ("landmarks = [{ cad = [0, 0, 0], pixels = [[1, 2], [3, 4]] }]", "There are 1 landmarks, and 4 or more"),

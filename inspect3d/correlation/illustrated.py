@@ -9,17 +9,15 @@ from numpy.typing import NDArray
 
 from inspect3d.arrays import Floats
 from inspect3d.camera import View
-from inspect3d.correlation.outline import outline
+from inspect3d.correlation.overlay import overlay, reduced
 from inspect3d.correlation.picks import Picks
 from inspect3d.correlation.picture import Pictures, Stack
 from inspect3d.correlation.residual import residuals
 from inspect3d.correlation.shape import Shape
 from inspect3d.correlation.solver import Step
-from inspect3d.figure import Descent, Figure, Photograph, PixelMap
+from inspect3d.figure import Descent, Figure, PixelMap
 from inspect3d.nominal.nominal import Nominal
 
-WIDEST = 800  # px of a picture in the report
-FINEST = 3  # px of a photograph in one of its residual map's
 MOVES = {"poses": "poses", "cameras": "cameras", "shape": "shape", "both": "cameras and shape"}
 
 
@@ -40,13 +38,13 @@ def illustrated(
     steps : all that it made
     picks : it started from, if any
     """
-    small = [_reduced(picture) for picture in grey]
+    small = [reduced(picture) for picture in grey]
     figures: list[Figure] = []
-    for k, (view, (picture, scale)) in enumerate(zip(shape.views, small, strict=True)):
+    for k, (view, each) in enumerate(zip(shape.views, small, strict=True)):
         marks = np.zeros((0, 2)) if picks is None else picks.pixels[:, k]
         words = f"The CAD model over picture {k + 1}"
         words += "; crosses: landmarks as picked" if picks else ""
-        figures.append(Photograph(f"picture_{k + 1}", words, picture, scale, outline(nominal, view), marks))
+        figures.append(overlay(f"picture_{k + 1}", words, nominal, view, each, marks))
     stages = [("start", "at the start", tuple(start), False)]
     if shape.calibrated is not None:
         stages.append(("calibration", "after the cameras were fitted to the nominal shape", shape.calibrated, False))
@@ -73,19 +71,6 @@ def illustrated(
     )
     figures.append(Descent("convergence", "How the solution converged, stage by stage", names, curves))
     return tuple(figures)
-
-
-def _reduced(grey: Floats) -> tuple[NDArray[np.uint8], float]:
-    """Return a picture small enough for the report, 8 bit, and how many of its pixels go into one."""
-    import cv2
-
-    scale = max(FINEST, int(np.ceil(grey.shape[1] / WIDEST)))
-    size = (max(grey.shape[1] // scale, 1), max(grey.shape[0] // scale, 1))
-    small = cv2.resize(
-        grey[: size[1] * scale, : size[0] * scale].astype(np.float32), size, interpolation=cv2.INTER_AREA
-    )
-    low, high = np.percentile(small, (0.5, 99.5))
-    return np.clip(255 * (small - low) / max(high - low, 1e-9), 0, 255).astype(np.uint8), float(scale)
 
 
 def _residual_map(

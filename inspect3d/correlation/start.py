@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inspect3d.arrays import Floats
+from inspect3d.arrays import Booleans, Floats
 from inspect3d.camera import Camera, View
+from inspect3d.correlation.automatic import Automatic, Scenery, automatic
 from inspect3d.correlation.freedom import Freedom, Lens, Poses, Stand
 from inspect3d.correlation.picks import Picks, ideal_camera, placed_by_picks, view_from_dlt
+from inspect3d.figure import Figure
 from inspect3d.files.calibration import CameraSigma, Rig
 from inspect3d.files.photograph import Photograph
+from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
 from inspect3d.pose import Pose
 
@@ -31,12 +34,16 @@ class Begin:
     freedom : what is not known about them
     rig_view : the first camera in the frame of the calibration; None where that says nothing about places
     remarks : how the start was found, a sentence each
+    symmetric : whether the part would look the same in another place
+    figures : what the report shows of the start
     """
 
     views: tuple[View, ...]
     freedom: Freedom
     rig_view: View | None
     remarks: tuple[str, ...]
+    symmetric: bool = False
+    figures: tuple[Figure, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,58 +53,65 @@ class StereoStart:
     Parameters
     ----------
     picks : landmarks, or None
-    rig_from_cad : where the part starts in the frame of a calibration that has one
-    refine : whether its place there is refined
+    cad_from_measured : where the part is before the rig, or before the first camera where there is none; None: unknown
+    refine : whether that place is refined
     """
 
     picks: Picks | None
-    rig_from_cad: Pose
+    cad_from_measured: Pose | None
     refine: bool
 
-    def calibrated(self, rig: Rig, nodes: Floats) -> Begin:
-        """Return the start with calibrated cameras.
+    def __call__(
+        self,
+        photographs: Sequence[Photograph],
+        masks: Sequence[Booleans | None],
+        rig: Rig | None,
+        focals: Sequence[float | None],
+        nominal: Nominal,
+    ) -> Begin:
+        """Return where the solver begins: from the calibration, from landmarks, or else found from the pictures alone.
 
         Parameters
         ----------
-        nodes : (n, 3) mm, of the part
+        masks : of each photograph, True where it may be used, or None
+        rig : what a calibration says about the cameras, or None
+        focals : px, rough focal length of each camera; None: by the EXIF data, or by six picks
 
         Raises
         ------
         MeasurementError
-            The landmarks do not fit the part, or there are none and they are needed.
+            The landmarks do not fit the part, or the pictures alone do not tell where it is.
         """
+        scenery = Scenery(nominal, photographs, masks)
+        return self._calibrated(rig, scenery) if rig else self._uncalibrated(focals, scenery)
+
+    def _calibrated(self, rig: Rig, scenery: Scenery) -> Begin:
         lenses = tuple(_lens(sigma) for sigma in rig.sigmas)
         places = rig.camera_from_cad or rig.camera_from_rig
         if places is None or not rig.scaled:
-            return self._picked(rig.cameras, lenses, nodes, ())
-        first = View(rig.cameras[0], places[0])
-        views = tuple(View(c, place @ self.rig_from_cad) for c, place in zip(rig.cameras, places, strict=True))
+            return self._free(rig.cameras, lenses, scenery, ())
+        nodes = scenery.nominal.mesh.nodes
+        cad_from_rig = self.cad_from_measured or Pose.identity()
+        in_rig = tuple(map(View, rig.cameras, places))
+        views = _before(in_rig, cad_from_rig)
         poses: Poses = "common" if self.refine else "known"
-        start, cad_from_rig = views, self.rig_from_cad.inverse()
+        found: Automatic | None = None
         remarks: tuple[str, ...] = ()
         if self.picks is not None and self.refine:
             freedom = Freedom(poses, lenses, views, self.picks.points_cad.mean(axis=0))
             placed = placed_by_picks(self.picks, views, rig.cameras, freedom)
-            start, remarks = placed.views, (_fit_words(self.picks, placed.errors),)
-            cad_from_rig = start[0].camera_from_cad.inverse() @ first.camera_from_cad
-        priors = tuple(View(c, place @ cad_from_rig.inverse()) for c, place in zip(rig.cameras, places, strict=True))
+            views, remarks = placed.views, (_fit_words(self.picks, placed.errors),)
+        elif not rig.camera_from_cad and self.cad_from_measured is None:
+            found = automatic(scenery, rig.cameras, lenses, in_rig, None)
+            views, remarks = found.views, found.remarks
+        cad_from_rig = views[0].camera_from_cad.inverse() @ in_rig[0].camera_from_cad
         x, y, z = (float(value) for value in cad_from_rig.translation)
-        freedom = Freedom(poses, lenses, priors, nodes.mean(axis=0), _stands(rig), (x, y, z))
-        return Begin(start, freedom, first, remarks)
+        freedom = Freedom(poses, lenses, _before(in_rig, cad_from_rig), nodes.mean(axis=0), _stands(rig), (x, y, z))
+        begin = Begin(views, freedom, in_rig[0], remarks)
+        return replace(begin, symmetric=found.symmetric, figures=found.figures) if found else begin
 
-    def uncalibrated(self, photographs: Sequence[Photograph], focals: Sequence[float | None], nodes: Floats) -> Begin:
-        """Return the start with lenses that nobody calibrated, from picks.
-
-        Parameters
-        ----------
-        focals : px, rough focal length of each camera; None: by the EXIF data, or by six picks
-        nodes : (n, 3) mm, of the part
-
-        Raises
-        ------
-        MeasurementError
-            The landmarks are missing, do not fit the part, or are too flat to give the focal length.
-        """
+    def _uncalibrated(self, focals: Sequence[float | None], scenery: Scenery) -> Begin:
+        photographs, nodes = scenery.photographs, scenery.nominal.mesh.nodes
         rough = [
             self._rough(k, photograph, focal, nodes)
             for k, (photograph, focal) in enumerate(zip(photographs, focals, strict=True))
@@ -112,7 +126,7 @@ class StereoStart:
         )
         cameras = tuple(ideal_camera(each[0], p.size) for each, p in zip(rough, photographs, strict=True))
         remark = f"Rough focal lengths to start with, and how well known: {words}."
-        return self._picked(cameras, lenses, nodes, (remark,))
+        return self._free(cameras, lenses, scenery, (remark,))
 
     def _rough(self, k: int, photograph: Photograph, focal: float | None, nodes: Floats) -> tuple[float, float, str]:
         """Return the focal length (px) of picture k, its relative uncertainty, and where it is from."""
@@ -125,17 +139,24 @@ class StereoStart:
         matrix = view_from_dlt(self.picks.points_cad, self.picks.pixels[:, k], photograph.size, nodes).camera.matrix
         return float(np.sqrt(matrix[0, 0] * matrix[1, 1])), WIDE, "the landmarks (direct linear transformation)"
 
-    def _picked(
-        self, cameras: tuple[Camera, ...], lenses: tuple[Lens, ...], nodes: Floats, remarks: tuple[str, ...]
+    def _free(
+        self, cameras: tuple[Camera, ...], lenses: tuple[Lens, ...], scenery: Scenery, remarks: tuple[str, ...]
     ) -> Begin:
         """Return the start of cameras whose places are unknown."""
-        if self.picks is None:
-            raise MeasurementError("Nothing tells where the cameras stand before the part: pick 4 or more landmarks.")
         priors = tuple(View(camera, Pose.identity()) for camera in cameras)
+        last = Freedom("free", lenses, priors, scenery.nominal.mesh.nodes.mean(axis=0))
+        if self.picks is None:
+            found = automatic(scenery, cameras, lenses, (), self.cad_from_measured)
+            return Begin(found.views, last, None, (*remarks, *found.remarks), found.symmetric, found.figures)
         freedom = Freedom("free", lenses, priors, self.picks.points_cad.mean(axis=0))
         placed = placed_by_picks(self.picks, (), cameras, freedom)
-        freedom = Freedom("free", lenses, priors, nodes.mean(axis=0))
-        return Begin(placed.views, freedom, None, (*remarks, _fit_words(self.picks, placed.errors)))
+        return Begin(placed.views, last, None, (*remarks, _fit_words(self.picks, placed.errors)))
+
+
+def _before(in_rig: Sequence[View], cad_from_rig: Pose) -> tuple[View, ...]:
+    """Return the cameras of a rig before the part."""
+    back = cad_from_rig.inverse()
+    return tuple(View(view.camera, view.camera_from_cad @ back) for view in in_rig)
 
 
 def _fit_words(picks: Picks, errors: Floats) -> str:

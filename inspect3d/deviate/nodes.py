@@ -134,6 +134,7 @@ def _alignment(measured: NodalMeasurement, gauge: Gauge, motion: Floats, found: 
     moved = Pose.small(motion[:6], gauge.origin)
     shift = moved(((1 + growth) * (before.translation - gauge.origin) + gauge.origin)[None])[0]
     free = named(gauge.free, gauge.origin, gauge.length) if refine else ()
+    whole = Status.SYMMETRIC if measured.symmetric else Status.OK
     covariance = np.zeros((6, 6))
     if refine:
         covariance = gauge.covariance(found, gauge.length / BLOCKS)[:6, :6]
@@ -144,7 +145,7 @@ def _alignment(measured: NodalMeasurement, gauge: Gauge, motion: Floats, found: 
         covariance=covariance,
         origin=gauge.origin,
         used=np.abs(found - middle) < TUKEY * max(scale, 1e-12),
-        status=Status.FREE_MOTIONS if free else Status.OK,
+        status=Status.FREE_MOTIONS if free else whole,
         free=free,
     )
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from inspect3d.arrays import Booleans, Floats, booleans, floats
+from inspect3d.figure import Figure
 from inspect3d.outcome import MeasurementError, Status
 from inspect3d.pose import Pose
 
@@ -85,9 +86,17 @@ class NoAlignmentError(MeasurementError):
     sentence : what is wrong and what to do
     status : FAILED or AMBIGUOUS
     candidates : the poses considered, best first
+    figures : what the report shows of them
     """
 
-    def __init__(self, sentence: str, status: Status = Status.FAILED, candidates: tuple[Candidate, ...] = ()) -> None:
+    def __init__(
+        self,
+        sentence: str,
+        status: Status = Status.FAILED,
+        candidates: tuple[Candidate, ...] = (),
+        figures: tuple[Figure, ...] = (),
+    ) -> None:
         super().__init__(sentence)
         self.status = status
         self.candidates = candidates
+        self.figures = figures

@@ -56,9 +56,7 @@ class PoseSearch:
     apart: float = 0.03
     seed: int = 0
 
-    def __call__(
-        self, cloud: Thinned, surface: Surface, field: Field, judge: Judge | None = None
-    ) -> list[Similarity]:
+    def __call__(self, cloud: Thinned, surface: Surface, field: Field, judge: Judge | None = None) -> list[Similarity]:
         """Return the poses cad_from_cloud found, best first.
 
         Parameters

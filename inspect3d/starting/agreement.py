@@ -65,14 +65,14 @@ def agreement(surface: Surface, views: Sequence[View], stack: Stack, masks: Sequ
 
 def _seen(surface: Surface, view: View, points: Floats, normals: Floats, mask: Booleans | None) -> Booleans:
     sight = unit(view.centre - points)
-    seen = (np.einsum("ni,ni->n", sight, normals) > STEEPEST) & (view.depth(points) > 0)
+    seen = np.asarray((np.einsum("ni,ni->n", sight, normals) > STEEPEST) & (view.depth(points) > 0))
     at = np.rint(view.project(points[seen])).astype(int)
     margin = int(SPACING * HALF) + 2
     width, height = view.camera.size
-    inside = ((at >= margin) & (at < np.array([width, height]) - margin)).all(axis=1)
+    inside = np.asarray(((at >= margin) & (at < np.array([width, height]) - margin)).all(axis=1))
     if mask is not None:
         inside[inside] = mask[at[inside, 1], at[inside, 0]]
-    seen[seen] = inside
+    seen[np.flatnonzero(seen)] = inside
     near = np.flatnonzero(seen)
     seen[near] = ~surface.hides(points[near] + LIFT * surface.diagonal * normals[near], view.centre)
     return seen

@@ -20,6 +20,7 @@ from inspect3d.starting.fitting import Fitted
 ON = 2e-3  # share of the CAD's diagonal within which a point lies on it
 BELIEVED = 0.7  # least share of the points before the CAD that lie on it, and of its surface on which pictures agree
 WORSE = 0.15  # share by which agreement or outline must fall behind to rule a start out
+MISSING = 0.06  # and share by which the points on the CAD must
 APART = 0.03  # share of the diagonal below which two starts are the same
 
 
@@ -88,7 +89,8 @@ def answer(trials: Sequence[Trial], smooth: Smooth) -> Answer:
     kept: list[Trial] = []
     for trial in ranked:
         behind = best.agreement.share - trial.agreement.share, trial.bareness - best.bareness
-        if max(behind) < WORSE and all(_apart(trial, other, smooth) for other in kept):
+        unexplained = best.explained - trial.explained
+        if max(behind) < WORSE and unexplained < MISSING and all(_apart(trial, other, smooth) for other in kept):
             kept.append(trial)
     fits = [_as_fit(trial, kept[0], smooth) for trial in kept]
     choice = choose(fits, smooth, kept[0].fit.bundle.points)

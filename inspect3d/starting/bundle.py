@@ -68,7 +68,7 @@ class Bundle:
     def ahead(self) -> Booleans:
         """Tell which points lie before all the cameras that see them, (n,)."""
         depths = np.stack([view.depth(self.points) for view in self.views], axis=1)
-        return ((depths > 0) | ~self.seen).all(axis=1)
+        return np.asarray(((depths > 0) | ~self.seen).all(axis=1))
 
     @property
     def misses(self) -> Floats:
@@ -110,9 +110,7 @@ class Adjusted:
     cost: float
 
 
-def adjusted(
-    bundle: Bundle, freedom: Freedom, noise: float, planes: Planes | None = None, steps: int = 20
-) -> Adjusted:
+def adjusted(bundle: Bundle, freedom: Freedom, noise: float, planes: Planes | None = None, steps: int = 20) -> Adjusted:
     """Return the bundle that fits pixels, priors and planes best, by Levenberg-Marquardt with the points eliminated.
 
     A point is weighted down the more, the farther it appears from where it was found (Geman and McClure's weights).

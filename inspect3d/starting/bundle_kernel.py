@@ -36,9 +36,7 @@ def write_slopes(
     by_view: Floats,
 ) -> float:
     """Write where a point appears (2,), the derivatives by it (2, 3) and by the view (2, 16); return its depth."""
-    (px, py, depth), slope = project_with_slope(
-        matrix, distortion, rotation, translation, point[0], point[1], point[2]
-    )
+    (px, py, depth), slope = project_with_slope(matrix, distortion, rotation, translation, point[0], point[1], point[2])
     pixel[0], pixel[1] = px, py
     for a in range(2):
         for b in range(3):

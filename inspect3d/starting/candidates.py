@@ -82,14 +82,13 @@ class Candidates:
         """Return the share of the cloud that lies off the CAD, in each place, (k,)."""
         from inspect3d.register.search_kernel import costs
 
-        grid = (self.field.origin, self.field.step, self.field.feet, self.field.normals)
-        near = NEAR * self.surface.diagonal
-        return costs(*stacked(places), cloud.points, cloud.normals, cloud.oriented, near, *grid)
+        return costs(
+            *stacked(places), cloud.points, cloud.normals, cloud.oriented, NEAR * self.surface.diagonal,
+            self.field.origin, self.field.step, self.field.feet, self.field.normals,
+        )  # fmt: skip
 
 
-def _shaken(
-    place: Similarity, points: Floats, size: float, random: np.random.Generator, scaled: bool
-) -> Similarity:
+def _shaken(place: Similarity, points: Floats, size: float, random: np.random.Generator, scaled: bool) -> Similarity:
     """Return the place moved by about `size` mm at random."""
     centre = place(points.mean(axis=0)[None])[0]
     length = place.scale * float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))

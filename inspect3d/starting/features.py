@@ -54,11 +54,11 @@ def features(grey: Floats, mask: Booleans | None) -> Features:
     size = (round(columns / step), round(rows / step))
     low, high = np.percentile(grey[::4, ::4], (0.5, 99.5))
     eight = np.clip(255 * (grey - low) / max(high - low, 1e-9), 0, 255).astype(np.uint8)
-    chosen = None if mask is None else mask.astype(np.uint8)
+    allowed = np.ones(grey.shape, np.uint8) if mask is None else mask.astype(np.uint8)
     if step > 1:
-        eight = cv2.resize(eight, size, interpolation=cv2.INTER_AREA)
-        chosen = None if chosen is None else cv2.resize(chosen, size, interpolation=cv2.INTER_NEAREST)
-    keys, looks = cv2.SIFT.create(nfeatures=MOST, contrastThreshold=CONTRAST).detectAndCompute(eight, chosen)
+        eight = np.asarray(cv2.resize(eight, size, interpolation=cv2.INTER_AREA), np.uint8)
+        allowed = np.asarray(cv2.resize(allowed, size, interpolation=cv2.INTER_NEAREST), np.uint8)
+    keys, looks = cv2.SIFT.create(nfeatures=MOST, contrastThreshold=CONTRAST).detectAndCompute(eight, allowed)
     if not keys:
         return Features(np.zeros((0, 2)), np.zeros((0, 128), np.float32), step)
     ratio = np.array([columns / size[0], rows / size[1]])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -76,18 +76,3 @@ def _on(bundle: Bundle, normals: Floats, surface: Surface) -> Fitted:
     feet = surface.closest(bundle.points)
     cosine = np.einsum("ni,ni->n", normals, feet.normals)
     return Fitted(bundle, feet, (cosine > OPPOSED) | ~normals.any(axis=1))
-
-
-def with_all(fit: Fitted, whole: Bundle, normals: Floats, surface: Surface, noise: float) -> Fitted:
-    """Return the fitted cameras with all the tracks of another bundle.
-
-    Parameters
-    ----------
-    whole : its points, in the frame in which `normals` are, start where the tracks are looked for
-    """
-    first, old = fit.bundle.views[0].camera_from_cad, whole.views[0].camera_from_cad
-    scale = np.median(first(fit.bundle.points)[:, 2]) / np.median(old(whole.points)[:, 2])
-    points = first.inverse()(scale * old(whole.points))
-    bundle = replace(whole, views=fit.bundle.views, points=points).settled(noise)
-    turned = normals @ (first.rotation.T @ old.rotation).T
-    return _on(bundle, turned, surface)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
-from inspect3d.arrays import Booleans, Floats
+from inspect3d.arrays import Floats, floats
 from inspect3d.camera import Camera, View
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.outcome import MeasurementError
@@ -17,6 +18,7 @@ from inspect3d.starting.bundle import Bundle, adjusted
 
 STRAY = 4.0  # noises within which a track obeys the cameras, before these are adjusted
 AGREES = 3.0  # and after
+RIG_STRAY, LEAST_SHARE = 4.0, 0.3  # px off a calibrated rig, and least share of the tracks within
 LEAST_ANGLE = np.radians(2.0)  # between two lines of sight that meet
 FEWEST = 30
 ENOUGH = 12  # tracks that place a further camera
@@ -26,9 +28,7 @@ SAME = np.radians(1.0)  # angle between cameras below which two answers are one
 TURNS = (6.0, 12.0, 20.0, 30.0, 45.0)  # degrees
 
 
-def relative(
-    cameras: Sequence[Camera], lenses: Sequence[Lens], pixels: Floats, noise: float
-) -> tuple[Bundle, ...]:
+def relative(cameras: Sequence[Camera], lenses: Sequence[Lens], pixels: Floats, noise: float) -> tuple[Bundle, ...]:
     """Return cameras and points that explain the tracks, in the frame of the first camera, at unit distance.
 
     Two cameras are placed by an essential matrix and by the homography that a plane would make; of both, what explains
@@ -77,6 +77,31 @@ def relative(
     return _different(answers)
 
 
+def triangulated(views: Sequence[View], pixels: Floats, noise: float) -> Bundle:
+    """Return the points that tracks show to cameras in known places.
+
+    Raises
+    ------
+    MeasurementError
+        The tracks are too few, or do not obey the cameras.
+    """
+    seen = np.isfinite(pixels[:, :, 0])
+    rays = np.full(pixels.shape, np.nan)
+    for k, view in enumerate(views):
+        rays[seen[:, k], k] = view.camera.undistorted(pixels[seen[:, k], k])
+    points = np.full((len(pixels), 3), np.nan)
+    _cross_all(points, {k: view.camera_from_cad for k, view in enumerate(views)}, rays)
+    bundle = Bundle(tuple(views), points, pixels).chosen(np.isfinite(points[:, 0]))
+    bundle = bundle.chosen(bundle.ahead).settled(noise)
+    good = bundle.ahead & (bundle.misses < RIG_STRAY).all(axis=1) & (_widest(bundle) > LEAST_ANGLE)
+    if np.count_nonzero(good) < FEWEST or good.mean() < LEAST_SHARE:
+        raise MeasurementError(
+            f"The pictures do not obey the calibration: {np.count_nonzero(good)} of {len(pixels)} features that they "
+            "have in common lie where it says. Check the order of the pictures and cameras, and that nothing has moved."
+        )
+    return bundle.chosen(good)
+
+
 def _pair_poses(
     pair: Bundle, one: Floats, other: Floats, lenses: Sequence[Lens], noise: float, reach: float
 ) -> list[Pose]:
@@ -109,7 +134,7 @@ def _epipolar_poses(one: Floats, other: Floats, reach: float) -> list[Pose]:
     """Return poses other_from_one with unit translation that may explain pairs of rays (n, 2)."""
     import cv2
 
-    found = []
+    found: list[tuple[Any, Any]] = []
     essential, good = cv2.findEssentialMat(one, other, np.eye(3), cv2.USAC_MAGSAC, 0.9999, reach)
     if essential is not None and essential.shape == (3, 3):
         turns = cv2.decomposeEssentialMat(essential)
@@ -122,7 +147,7 @@ def _epipolar_poses(one: Floats, other: Floats, reach: float) -> list[Pose]:
     for turn, shift in found:
         length = np.linalg.norm(shift)
         if length > 1e-6 and np.linalg.det(turn) > 0:
-            pose = Pose(turn, shift / length)
+            pose = Pose(floats(turn, "turn", 3, 3), floats(shift / length, "shift", 3))
             points = crossing(pose, one, other)
             ahead = (points[:, 2] > 0) & (pose(points)[:, 2] > 0)
             if ahead.mean() > 0.5:
@@ -210,11 +235,11 @@ def _all_placed(
         )  # fmt: skip
         if not done or good is None or len(good) < ENOUGH:
             return None
-        places[k] = Pose(cv2.Rodrigues(turn)[0], shift.ravel())
+        places[k] = Pose(floats(cv2.Rodrigues(turn)[0], "turn", 3, 3), floats(shift.ravel(), "shift", 3))
     views = tuple(View(camera, places[k]) for k, camera in enumerate(cameras))
     bundle = Bundle(views, points, pixels).chosen(np.isfinite(points[:, 0]))
     bundle = bundle.chosen(bundle.ahead)
-    bundle = bundle.chosen((bundle.misses < 6 * STRAY * noise).all(axis=1))
+    bundle = bundle.chosen(np.asarray((bundle.misses < 6 * STRAY * noise).all(axis=1)))
     return bundle if len(bundle.points) >= FEWEST else None
 
 

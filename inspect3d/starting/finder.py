@@ -1,0 +1,208 @@
+"""The start without a click, from the pictures to the cameras before the part."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from os import cpu_count
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from inspect3d.arrays import Booleans, Floats, unit
+from inspect3d.camera import Camera, View
+from inspect3d.correlation.freedom import Freedom, Lens
+from inspect3d.correlation.picture import Pictures, Stack
+from inspect3d.measure import Cloud
+from inspect3d.nominal.nominal import Nominal
+from inspect3d.outcome import MeasurementError
+from inspect3d.pose import Pose
+from inspect3d.progress import running
+from inspect3d.register.field import Field
+from inspect3d.register.similarity import Similarity
+from inspect3d.register.smooth import Smooth
+from inspect3d.register.symmetry import surface_points
+from inspect3d.register.thinned import Thinned, thinned
+from inspect3d.starting.agreement import agreement
+from inspect3d.starting.answer import Answer, Trial, answer, explained
+from inspect3d.starting.bundle import Bundle
+from inspect3d.starting.candidates import Candidates
+from inspect3d.starting.features import Features, features
+from inspect3d.starting.fitting import fitted
+from inspect3d.starting.relative import relative, triangulated
+from inspect3d.starting.texture import Texture, stacked
+from inspect3d.starting.tracks import tracks
+
+NOISE = 0.3  # px of the reduced pictures, of a feature's place
+CLOUD = 900  # points that stand for all where the part is searched
+STRIDE = 2  # of them, every so many-th is fitted
+BLUR = 1.5  # px of the reduced pictures, in which patches are compared
+OUTLINE = 500  # points over the part by which its outline is judged
+
+
+@dataclass(frozen=True, eq=False)
+class Pictured:
+    """A picture and what is known of its camera.
+
+    Parameters
+    ----------
+    grey : (rows, columns) grey levels
+    mask : (rows, columns), where the picture may be used, or None
+    camera : the lens, perhaps a rough one
+    lens : how well it is known
+    """
+
+    grey: Floats
+    mask: Booleans | None
+    camera: Camera
+    lens: Lens
+
+
+@dataclass(frozen=True, eq=False)
+class FindStart:
+    """Find the cameras before the part from the pictures alone.
+
+    Features that the pictures have in common give the places of the cameras relative to each other and a cloud of
+    points, both up to a scale where the cameras are no known rig. The cloud is searched on the CAD; the best places are
+    refined, cameras, lenses and points together, and ranked by how well points and pictures agree with the CAD.
+
+    Parameters
+    ----------
+    nominal : the part as designed
+    """
+
+    nominal: Nominal
+
+    def __call__(
+        self, pictured: Sequence[Pictured], rig: Sequence[View] = (), cad_from_first: Pose | None = None
+    ) -> Answer:
+        """Return what the pictures say about the places of the cameras.
+
+        Parameters
+        ----------
+        rig : the cameras in the frame of their rig, where that is known
+        cad_from_first : where somebody says the first camera is, CAD from its frame; the others follow
+
+        Raises
+        ------
+        MeasurementError
+            The pictures have too little in common, or nothing in them lies on the CAD.
+        """
+        progress = running()
+        progress.update(0.0, "looking for features")
+        found = self._features(pictured)
+        progress.update(0.3, "matching features")
+        step = max(each.step for each in found)
+        noise = NOISE * step
+        pixels = self._tracks(pictured, found)
+        progress.update(0.45, "placing the cameras relative to each other")
+        if rig:
+            bundles: tuple[Bundle, ...] = (triangulated(rig, pixels, noise),)
+        else:
+            cameras, lenses = [each.camera for each in pictured], [each.lens for each in pictured]
+            bundles = tuple(self._resized(each) for each in relative(cameras, lenses, pixels, noise))
+        texture = Texture.of(found, [each.camera.size for each in pictured])
+        stack = Pictures([each.grey for each in pictured]).blurred(BLUR * step)
+        answers = []
+        for k, bundle in enumerate(bundles):
+            progress.update(0.55 + 0.4 * k / len(bundles), "searching the part")
+            answers.append(self._answer(bundle, pictured, bool(rig), cad_from_first, texture, stack, noise))
+        progress.update(1.0, "searching the part")
+        return max(answers, key=lambda each: (bool(each.trials), each.best.count * each.best.agreement.share))
+
+    @cached_property
+    def _smooth(self) -> Smooth:
+        return Smooth(self.nominal.surface)
+
+    @cached_property
+    def _field(self) -> Field:
+        return Field.of(self.nominal.surface)
+
+    @staticmethod
+    def _features(pictured: Sequence[Pictured]) -> list[Features]:
+        with ThreadPoolExecutor(cpu_count()) as pool:
+            return list(pool.map(lambda each: features(each.grey, each.mask), pictured))
+
+    @staticmethod
+    def _tracks(pictured: Sequence[Pictured], found: Sequence[Features]) -> Floats:
+        rays = [each.camera.undistorted(own.pixels) for each, own in zip(pictured, found, strict=True)]
+        return tracks(found, rays, [float(each.camera.matrix[0, 0]) for each in pictured])
+
+    def _resized(self, bundle: Bundle) -> Bundle:
+        """Return the bundle at about the size of the CAD, still in the frame of the first camera."""
+        away = bundle.points - np.median(bundle.points, axis=0)
+        axes = np.linalg.svd(away, full_matrices=False)[2]
+        low, high = np.percentile(away @ axes.T, [1, 99], axis=0)
+        scale = self.nominal.diagonal / float(np.linalg.norm(high - low))
+        return bundle.placed(Similarity(Pose.identity(), scale))
+
+    def _answer(
+        self,
+        bundle: Bundle,
+        pictured: Sequence[Pictured],
+        scaled: bool,
+        cad_from_first: Pose | None,
+        texture: Texture,
+        stack: Stack,
+        noise: float,
+    ) -> Answer:
+        toward = unit(np.mean([view.centre for view in bundle.views], axis=0) - bundle.points)
+        cloud = thinned(Cloud("the pictures", bundle.points, toward), CLOUD)
+        few = cloud.every(STRIDE)
+        part = bundle.chosen(cKDTree(bundle.points).query(few.points)[1])
+        if cad_from_first is not None:
+            places = [self._scaled(bundle, cad_from_first)]
+        else:
+            places = Candidates(self.nominal.surface, self._field)(cloud, bundle.views, texture, scaled)
+        freedom = _Free(tuple(each.camera for each in pictured), tuple(each.lens for each in pictured), scaled)
+        masks = [each.mask for each in pictured]
+        trials = [self._trial(part, few, place, freedom, texture, stack, masks, noise) for place in places]
+        return answer(trials, self._smooth)
+
+    def _trial(
+        self,
+        part: Bundle,
+        few: Thinned,
+        place: Similarity,
+        freedom: _Free,
+        texture: Texture,
+        stack: Stack,
+        masks: Sequence[Booleans | None],
+        noise: float,
+    ) -> Trial:
+        surface = self.nominal.surface
+        fit = fitted(part.placed(place), place.turned(few.normals), surface, freedom, noise)
+        views = fit.bundle.views
+        over, _ = surface_points(surface, OUTLINE)
+        bare = float(texture.bareness(views, stacked([Similarity.identity()]), over)[0])
+        share, count = explained(fit, self._smooth)
+        return Trial(fit, agreement(surface, views, stack, masks), bare, share, count)
+
+    def _scaled(self, bundle: Bundle, cad_from_first: Pose) -> Similarity:
+        """Return the place that a stated place of the first camera gives: its lines of sight tell the scale."""
+        centre = cad_from_first.translation
+        sights = cad_from_first.turned(bundle.points)
+        hits = self.nominal.surface.first_hit(centre, sights)
+        met = hits.triangle >= 0
+        if np.count_nonzero(met) < max(0.3 * len(met), 10):
+            raise MeasurementError(
+                "The first camera does not see the part from the place it is said to have: check alignment.matrix, "
+                "which is the CAD from the frame of the first camera, mm (x right, y down, z along its axis)."
+            )
+        scale = float(np.median(hits.distance[met] / np.linalg.norm(sights[met], axis=1)))
+        return Similarity(cad_from_first, scale)
+
+
+@dataclass(frozen=True, eq=False)
+class _Free:
+    """What may change about cameras at given places: their lenses, and the place of each, or of the rig."""
+
+    cameras: tuple[Camera, ...]
+    lenses: tuple[Lens, ...]
+    rigid: bool
+
+    def __call__(self, views: tuple[View, ...]) -> Freedom:
+        priors = tuple(View(camera, view.camera_from_cad) for camera, view in zip(self.cameras, views, strict=True))
+        return Freedom("common" if self.rigid else "free", self.lenses, priors, np.zeros(3))
