@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 import pytest
 
 from inspect3d.inspection import run
 from inspect3d.outcome import Status
-from tests.speckled import Speckle, photographed, picture, rig
-from tests.test_stereocorrelation import cad, errors, landmarks, photographs, recipe, rms
+from tests.speckled import rig
+from tests.test_stereocorrelation import cad, landmarks, photographs, recipe, rms
 
 
 @pytest.fixture(scope="module")
