@@ -163,7 +163,5 @@ class Pictured:
 
     def _placed(self, points_cad: Floats, pixels: Floats, focals: Sequence[float | None]) -> tuple[View, ...]:
         picks = Picks(points_cad, pixels) if len(points_cad) else None
-        start, nodes = StereoStart(picks, self.rig_from_cad, self.refine), self.nominal.mesh.nodes
-        if self.rig is not None:
-            return start.calibrated(self.rig, nodes).views
-        return start.uncalibrated(self.photographs, focals, nodes).views
+        start = StereoStart(picks, self.rig_from_cad.inverse(), self.refine)
+        return start(self.photographs, (None,) * len(self.photographs), self.rig, focals, self.nominal).views
