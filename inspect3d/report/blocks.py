@@ -179,6 +179,11 @@ def as_data(document: Document) -> dict[str, Any]:
     return data
 
 
+def numbered_files(data: dict[str, Any]) -> dict[int, str]:
+    """Return the files of a document's pictures by their numbers."""
+    return {picture["number"]: picture["file"] for picture in _pictures(data)}
+
+
 def _plain(value: Any) -> Any:
     if is_dataclass(value):
         kept = {field.name: _plain(getattr(value, field.name)) for field in fields(value)}

@@ -20,7 +20,6 @@ from inspect3d.report.digits import grouped, measured, number, significant
 from inspect3d.report.layout import Layout
 from inspect3d.report.matrix import draw_matrix
 from inspect3d.report.picture import Caption, Picture
-from inspect3d.report.scene import scene
 from inspect3d.report.viewpoint import Viewpoint
 from inspect3d.report.views import Views
 
@@ -62,7 +61,7 @@ def draw_comparisons(record: Record, folder: Path, views: Views, layout: Layout)
         viewpoint = _seen(record, views, np.any([part.deviation.observed for part in parts if part.deviation], axis=0))[
             0
         ]
-        draw_matrix(record, folder / "matrix.png", viewpoint, layout)
+        draw_matrix(record, folder / "matrix.png", views, viewpoint, layout)
         words = "All methods: their deviation maps on the diagonal, their differences above it (row minus column), "
         blocks.append(Shown("matrix.png", words + "the figures of each pair below it"))
     for k, comparison in enumerate(record.comparisons, start=1):
@@ -147,10 +146,10 @@ def _draw(record: Record, comparison: Comparison, k: int, folder: Path, views: V
     scale = scale.renamed("Difference", "mm")
     shown: list[Block] = []
 
-    def maps(name: str, words: str, values: Floats, scale: ColourScale, views: Sequence[Viewpoint]) -> None:
+    def maps(name: str, words: str, values: Floats, scale: ColourScale, chosen: Sequence[Viewpoint]) -> None:
         picture = Picture(mesh, layout, Caption(caption.title, f"{pair}: {words}", caption.figures), scale)
-        with scene(mesh.nodes, mesh.triangles, values, scale, layout.window) as window:
-            for position, viewpoint in enumerate(views, start=1):
+        with views.window(values, scale, layout.window) as window:
+            for position, viewpoint in enumerate(chosen, start=1):
                 file = f"comparison_{k}_{name}_{position}.png"
                 picture.taken(window, viewpoint).save(folder / file)
                 shown.append(Shown(file, f"{pair}: {words}, seen from {viewpoint.words}"))

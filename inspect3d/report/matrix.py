@@ -15,14 +15,14 @@ from inspect3d.report.colours import ColourScale, deviation_scale, symmetric_lim
 from inspect3d.report.digits import number
 from inspect3d.report.layout import Layout
 from inspect3d.report.picture import Caption
-from inspect3d.report.scene import scene
 from inspect3d.report.viewpoint import Viewpoint
+from inspect3d.report.views import Views
 
 MOST = 6
 """Methods that a sheet has room for."""
 
 
-def draw_matrix(record: Record, file: Path, viewpoint: Viewpoint, layout: Layout) -> None:
+def draw_matrix(record: Record, file: Path, views: Views, viewpoint: Viewpoint, layout: Layout) -> None:
     """Write the matrix as PNG: deviations on the diagonal, differences (row minus column) above, figures below.
 
     All maps have the same colours, so that they can be compared at a glance.
@@ -46,11 +46,11 @@ def draw_matrix(record: Record, file: Path, viewpoint: Viewpoint, layout: Layout
             comparison = pairs.get((first.name, second.name)) or pairs.get((second.name, first.name))
             if row == column and first.deviation is not None:
                 canvas.fitted(x + 6 * u, y, first.name, 26, width - 12 * u, weight="bold")
-                canvas.picture(x, y + 26 * u, _thumbnail(record, first.deviation.value, scale, size, viewpoint))
+                canvas.picture(x, y + 26 * u, _thumbnail(views, first.deviation.value, scale, size, viewpoint))
             elif comparison is not None and column > row:
                 sign = 1 if comparison.a == first.name else -1
                 canvas.fitted(x + 6 * u, y, f"{first.name} − {second.name}", 22, width - 12 * u, color=PALE)
-                canvas.picture(x, y + 26 * u, _thumbnail(record, sign * comparison.difference, scale, size, viewpoint))
+                canvas.picture(x, y + 26 * u, _thumbnail(views, sign * comparison.difference, scale, size, viewpoint))
             elif comparison is not None:
                 _draw_figures(canvas, comparison, x + 12 * u, y + height / 2 - 70 * u, width - 24 * u)
     draw_colour_bar(canvas, layout, scale)
@@ -58,10 +58,9 @@ def draw_matrix(record: Record, file: Path, viewpoint: Viewpoint, layout: Layout
 
 
 def _thumbnail(
-    record: Record, values: Floats, scale: ColourScale, size: tuple[int, int], viewpoint: Viewpoint
+    views: Views, values: Floats, scale: ColourScale, size: tuple[int, int], viewpoint: Viewpoint
 ) -> np.ndarray:
-    mesh = record.nominal.mesh
-    with scene(mesh.nodes, mesh.triangles, values, scale, size) as window:
+    with views.window(values, scale, size) as window:
         return window.draw(viewpoint)[0]
 
 

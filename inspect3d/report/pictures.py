@@ -27,7 +27,6 @@ from inspect3d.report.histogram import draw_histogram
 from inspect3d.report.layout import Layout
 from inspect3d.report.picture import Caption, Picture
 from inspect3d.report.reading import readings
-from inspect3d.report.scene import scene
 from inspect3d.report.viewpoint import Viewpoint
 from inspect3d.report.views import Views
 
@@ -99,7 +98,7 @@ def _draw_part(record: Record, folder: Path, views: Views) -> Shown:
         record.recipe.part.name, f"The part as designed, {size} mm", f"{len(mesh)} nodes, {edge} mm apart"
     )
     picture = Picture(mesh, Layout(*SIZE), caption)
-    with scene(mesh.nodes, mesh.triangles, np.full(len(mesh), np.nan), None, picture.layout.window) as window:
+    with views.window(np.full(len(mesh), np.nan), None, picture.layout.window) as window:
         picture.taken(window, viewpoint).save(folder / "part.png")
     return Shown("part.png", "The part as designed", viewpoint)
 
@@ -116,13 +115,13 @@ def _draw_measurement(record: Record, part: MeasuredPart, folder: Path, views: V
     figures = _figures(record, part)
 
     def pictures(
-        field: str, words: str, values: Floats, scale: ColourScale, views: tuple[Viewpoint, ...]
+        field: str, words: str, values: Floats, scale: ColourScale, chosen: tuple[Viewpoint, ...]
     ) -> list[Shown]:
         caption = Caption(table.name, f"{part.name}: {words[0].lower()}{words[1:]}", figures)
         picture = Picture(mesh, layout, caption, scale, flagged, table.tolerance if field == "deviation" else None)
         shown = []
-        with scene(mesh.nodes, mesh.triangles, values, scale, layout.window) as window:
-            for k, viewpoint in enumerate(views, start=1):
+        with views.window(values, scale, layout.window) as window:
+            for k, viewpoint in enumerate(chosen, start=1):
                 file = f"{part.name}_{field}_{k}.png"
                 picture.taken(window, viewpoint).save(folder / file)
                 shown.append(Shown(file, f"{words}, seen from {viewpoint.words}", viewpoint))

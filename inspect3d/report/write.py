@@ -58,4 +58,4 @@ def write_report(
     html = page(report, pictures, viewer_data(record, start(shown)))
     (folder / "report.html").write_text(html, encoding="utf-8")
     if "pdf" in record.recipe.report.formats:
-        (folder / "report.pdf").write_bytes(pdf(report, folder, moment))
+        (folder / "report.pdf").write_bytes(pdf(report, pictures, moment))
