@@ -7,6 +7,7 @@ from test_report import a_record, box_mesh, recipe
 
 from inspect3d.compare.compare import Compare
 from inspect3d.compare.measured_map import MeasuredMap
+from inspect3d.compare.sensitivity import OtherAlignment, Sensitivity
 from inspect3d.compare.tolerances import tolerances
 from inspect3d.compare.verdict import verdict
 from inspect3d.deviate.deviation import Deviation
@@ -35,6 +36,10 @@ def three_methods(edge: float = 2.5, **report: object) -> Record:
         residual = np.where(seen, np.abs(random.normal(0, 0.1, len(mesh))), np.nan) if k else None
         covariance = MapCovariance(node, Independent(sigma[node] ** 2), np.zeros((len(node), 0)))
         part = replace(base.parts[0], name=base.parts[k].name, deviation=deviation, covariance=covariance)
+        if k == 0:
+            motion = np.array([0, 0, 0, 0, 0, 0.03])
+            other = OtherAlignment.of("the datums A, B and C", motion, np.zeros(3), mesh)
+            part = replace(part, sensitivity=Sensitivity("a best fit", (other,), np.full(len(mesh), 0.001)))
         parts.append(replace(part, verdict=verdict(deviation, limits, 0.95), residual=residual, points_cad=None))
         maps.append(MeasuredMap(parts[-1].name, deviation, covariance, {"ab": "left <1>.png"} if k else {}))
     nominal = Nominal(table.part.name, Surface(mesh.nodes, mesh.triangles), mesh, 0.003)

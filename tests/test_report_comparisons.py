@@ -68,6 +68,15 @@ def test_three_methods_have_a_matrix(out):
     assert len(re.findall(r"All methods: their deviation maps", html)) >= 1
 
 
+def test_what_another_alignment_would_change_is_shown(out):
+    html = (out / "report.html").read_text("utf-8")
+    assert "The map is aligned by a best fit." in html
+    row = re.search(r"the datums A, B and C</td>(.*?)</tr>", html)[1]
+    assert re.findall(r">([^<]+)</td>", row) == ["30 µm", "0°", "30 µm"]
+    assert (out / "pictures" / "laser_alignment_1.png").exists()
+    assert not (out / "pictures" / "wrong_alignment_1.png").exists()
+
+
 def test_coverage_adds_up(out):
     html = (out / "report.html").read_text("utf-8")
     rows = dict(

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from inspect3d.arrays import Floats
 from inspect3d.record import MeasuredPart, Record
 from inspect3d.report.blocks import (
     Badge,
@@ -28,7 +29,7 @@ from inspect3d.report.blocks import (
     table_of,
 )
 from inspect3d.report.colours import BAND_COLOURS, UNMEASURED
-from inspect3d.report.digits import COVERAGE, decimals, grouped, measured, number
+from inspect3d.report.digits import COVERAGE, decimals, grouped, measured, number, significant
 from inspect3d.report.pose_words import advice, alignment_rows, motions, poses
 from inspect3d.report.reading import Reading, readings
 from inspect3d.report.uncertainty import contributions
@@ -93,6 +94,7 @@ def account(
         *_statistics(record, part, figures),
         *_poses(part),
         *_pose_uncertainty(part),
+        *_choice(part),
         *_hidden(part),
         *_budget(record, part),
         *_provenance(part),
@@ -206,6 +208,36 @@ def _pose_uncertainty(part: MeasuredPart) -> list[Block]:
     origin = ", ".join(number(float(x), 2) for x in first.origin)
     words = f"Standard uncertainties of a small motion applied after the alignment, about ({origin}) mm."
     return [Folded("Uncertainty of the pose", (Paragraph(words), table_of(motions(first))))]
+
+
+def _choice(part: MeasuredPart) -> list[Block]:
+    """Say what another choice of the alignment would change."""
+    found = part.sensitivity
+    if found is None:
+        return []
+    blocks: list[Block] = [
+        Heading("Choice of the alignment"),
+        Paragraph(
+            f"The map is aligned by {found.chosen}. The uncertainty of that pose alone moves a node by up to "
+            f"{_micro(COVERAGE * float(found.within.max()))} (U, k = 2)."
+        ),
+    ]
+    if found.others:
+        rows = tuple(
+            (other.words, _micro(float(np.abs(other.shift).max())), *_moved(other.motion)) for other in found.others
+        )
+        head = ("Instead by", "Largest change of a deviation", "Turn", "Shift")
+        blocks.append(Table(head, rows, ("text", "number", "number", "number")))
+    return blocks + ([Bullets(found.remarks)] if found.remarks else [])
+
+
+def _moved(motion: Floats) -> tuple[str, str]:
+    turn, shift = float(np.linalg.norm(motion[:3])), float(np.linalg.norm(motion[3:]))
+    return f"{significant(float(np.degrees(turn)), 2)}°", _micro(shift)
+
+
+def _micro(length: float) -> str:
+    return f"{significant(1000 * length, 3)} µm"
 
 
 def _hidden(part: MeasuredPart) -> list[Block]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -89,6 +89,14 @@ def sigma_scale(record: Record, part: MeasuredPart) -> ColourScale:
     return rising_scale("Uncertainty", "mm", limits)
 
 
+def spread_scale(record: Record, part: MeasuredPart) -> ColourScale:
+    """Return the colours of a map of what the choice of the alignment changes."""
+    if part.sensitivity is None:
+        return rising_scale("Change", "mm", (0.0, 1.0))
+    limits = rising_limits(part.sensitivity.spread, record.nominal.mesh.areas)
+    return replace(rising_scale("Change", "mm", limits), rest="none")
+
+
 def _draw_part(record: Record, folder: Path, views: Views) -> Shown:
     mesh = record.nominal.mesh
     viewpoint = views.overview(mesh.areas)
@@ -144,6 +152,9 @@ def _draw_measurement(record: Record, part: MeasuredPart, folder: Path, views: V
         values = np.where(deviation.observed, part.residual, np.nan)
         scale = rising_scale("Residual", "", rising_limits(values[deviation.observed], mesh.areas[deviation.observed]))
         shown += pictures("residual", "Grey-level residual, normalised", values, scale, viewpoints[:1])
+    if part.sensitivity is not None and part.sensitivity.others:
+        words = "Change of the deviation between the choices of the alignment"
+        shown += pictures("alignment", words, part.sensitivity.spread, spread_scale(record, part), viewpoints[:1])
     for figure in part.figures:
         file = f"{part.name}_{figure.name}.png"
         draw_figure(folder / file, figure, table.name, part.name, Layout(*SIZE))

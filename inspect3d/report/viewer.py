@@ -30,7 +30,7 @@ from inspect3d.report.colours import (
     symmetric_limits,
 )
 from inspect3d.report.detail import Detail, distinct
-from inspect3d.report.pictures import map_scale, sigma_scale
+from inspect3d.report.pictures import map_scale, sigma_scale, spread_scale
 from inspect3d.report.reading import readings
 from inspect3d.report.viewpoint import Viewpoint
 from inspect3d.report.worst import worst_places
@@ -110,6 +110,9 @@ def _map(record: Record, part: MeasuredPart, detail: Detail) -> dict[str, Any]:
         limits = rising_limits(part.residual[seen], mesh.areas[seen])
         values = np.where(seen, part.residual, np.nan)[detail.nodes]
         fields.append(_field("residual", "grey-level residual", values, rising_scale("Residual", "", limits)))
+    if part.sensitivity is not None and part.sensitivity.others:
+        spread = part.sensitivity.spread[detail.nodes]
+        fields.append(_field("alignment", "change between alignments", spread, spread_scale(record, part)))
     labels = [
         {"name": reading.name, "node": int(detail.place[reading.node])}
         for reading in readings(mesh, part, record.recipe.report.labels)
