@@ -85,6 +85,15 @@ def test_a_dent_beside_a_bump_is_a_region_of_its_own():
     assert sorted(np.sign(region.mean) for region in found) == [-1, 1]
 
 
+def test_a_defect_is_no_region_on_another_face_that_wide_windows_reach_it_from():
+    upper = MESH.nodes + np.array([0.0, 0.0, 15.0])
+    nodes, normals, areas = np.concatenate([MESH.nodes, upper]), np.tile(MESH.normals, (2, 1)), np.tile(MESH.areas, 2)
+    noise = np.random.default_rng(3).normal(0, SIGMA, len(nodes))
+    values = noise + np.concatenate([bump(0.5), np.zeros(len(MESH))])
+    (found,) = RegionTest()(values, Independent(np.full(len(nodes), SIGMA**2)), nodes, normals, areas)
+    assert found.nodes.max() < len(MESH)
+
+
 def test_many_nodes_are_gathered_into_patches_with_the_covariance_of_their_means():
     covariance, factor = neighbourly()
     patches = Patches.of(MESH.nodes, MESH.normals, MESH.areas, 100)
