@@ -23,7 +23,6 @@ from pathlib import Path
 
 import numpy as np
 
-from inspect3d.arrays import Floats
 from inspect3d.compare.compare import Compare
 from inspect3d.compare.comparison import Comparison
 from inspect3d.compare.measured_map import MeasuredMap
