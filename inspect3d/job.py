@@ -114,6 +114,7 @@ def _of_clouds(
             coating_sigma=coating.sigma,
             calibration=recipe.report.budget.calibration,
             scale_known=measurement.scale_known,
+            scale_sigma=measurement.scale_sigma,
         )
         found = deviate(measurement.clouds, alignments, nominal, _counted(recipe, nominal))
     return replace(
@@ -122,6 +123,7 @@ def _of_clouds(
         points_cad=found.points_cad,
         point_deviation=found.distance,
         noise=found.noise,
+        views=found.alignments[0].views(measurement.views),
         remarks=(*measurement.remarks, *found.remarks),
     )
 

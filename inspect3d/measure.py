@@ -81,12 +81,16 @@ class Measurement:
     clouds : one or more, each aligned by itself; a point belongs to exactly one
     frame : "instrument" (to be aligned) or "cad" (already there; a start "auto" then begins at the identity)
     scale_known : False where the method cannot see the scale (COLMAP without cameras)
+    scale_sigma : relative standard uncertainty of a known scale
+    views : the cameras in the frame and scale of the points, if the method has any
     remarks : what was done to the data that the report must say, a sentence each
     """
 
     clouds: tuple[Cloud, ...]
     frame: Literal["instrument", "cad"] = "instrument"
     scale_known: bool = True
+    scale_sigma: float = 0.0
+    views: tuple[View, ...] = ()
     remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

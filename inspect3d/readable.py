@@ -6,6 +6,8 @@ from pathlib import Path
 
 from inspect3d.outcome import InputError
 
+PICTURES = (".png", ".tif", ".tiff", ".jpg", ".jpeg")
+
 
 def readable(path: Path, where: str) -> Path:
     """Return the path itself, if it is a file that can be read.
@@ -32,6 +34,14 @@ def readable(path: Path, where: str) -> Path:
             return path
     except OSError as error:
         raise InputError(f"{where}: {path} cannot be read: {error.strerror}.") from error
+
+
+def pictures_in(path: Path) -> tuple[Path, ...]:
+    """Return the PNG, TIFF and JPEG files of a folder by name, or the path itself where it is no folder with such."""
+    if not path.is_dir():
+        return (path,)
+    found = (each for each in path.iterdir() if each.suffix.lower() in PICTURES and each.is_file())
+    return tuple(sorted(found)) or (path,)
 
 
 def _hint(path: Path) -> str:

@@ -12,7 +12,7 @@ from inspect3d.complaint import complaint
 from inspect3d.file_name import file_name
 from inspect3d.measure import Files
 from inspect3d.outcome import InputError
-from inspect3d.readable import readable
+from inspect3d.readable import pictures_in, readable
 from inspect3d.recipe_alignment import Start
 from inspect3d.recipe_types import (
     Direction,
@@ -186,7 +186,7 @@ class Recipe(Table):
         return readable(self.folder / self.part.cad, "part.cad")
 
     def files(self, table: MeasurementTable) -> Files:
-        """Return the files one of the measurements names, all of them readable.
+        """Return the files one of the measurements names, all of them readable; `images` may name a folder of pictures.
 
         Raises
         ------
@@ -194,7 +194,11 @@ class Recipe(Table):
             One is missing, is a folder, or may not be read.
         """
         paths = {
-            key: tuple(readable(self.folder / name, f"measurements[{table.name!r}].{key}") for name in names)
+            key: tuple(
+                readable(path, f"measurements[{table.name!r}].{key}")
+                for name in names
+                for path in (pictures_in(self.folder / name) if key == "images" else (self.folder / name,))
+            )
             for key in FILE_KEYS
             if (names := table.listed(key))
         }

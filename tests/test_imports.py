@@ -48,7 +48,7 @@ PIPELINE = (
 )
 """The modules of inspect3d in the order of the pipeline; a module imports from its own stage and from earlier ones."""
 
-ASIDE = {"virtual": "deviate", "web": "inspection", "correlation": "deviate", "starting": "deviate"}
+ASIDE = {"virtual": "deviate", "web": "inspection", "correlation": "deviate", "starting": "deviate", "triangulation": "deviate"}
 """Packages beside the pipeline, which no stage before this one's successors imports."""
 
 HEAVY = {
@@ -104,7 +104,9 @@ def test_a_module_imports_only_from_its_own_stage_and_earlier_ones(path):
 def test_a_plugin_imports_nothing_that_comes_after_measuring(path):
     names = imported(ast.parse(path.read_text(encoding="utf-8")))
     stages = {name.split(".")[1] for name in names if name.startswith("inspect3d.")}
-    assert all(rank(stage) <= rank("measure") or stage in ("correlation", "recipe") for stage in stages), stages
+    assert all(
+        rank(stage) <= rank("measure") or stage in ("correlation", "triangulation", "recipe") for stage in stages
+    ), stages
 
 
 HELP = """

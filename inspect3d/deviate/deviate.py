@@ -69,6 +69,7 @@ class Deviate:
     coating : mm, thickness of paint, subtracted
     coating_sigma, calibration : mm, standard uncertainties that all nodes share
     scale_known : False takes the growth of the part out of the map as well
+    scale_sigma : relative standard uncertainty of the scale of the clouds, where it is known
     steps : of the alignment at the most
     """
 
@@ -80,6 +81,7 @@ class Deviate:
     coating_sigma: float = 0.0
     calibration: float = 0.0
     scale_known: bool = True
+    scale_sigma: float = 0.0
     steps: int = 6
 
     def __call__(
@@ -166,12 +168,13 @@ class Deviate:
         seen = np.flatnonzero(fit.observed)
         local = fit.variance[seen]
         coating = np.full(len(seen), self.coating_sigma)
+        growth = self.scale_sigma * ((gauge.nodes - gauge.origin) * gauge.normals).sum(axis=1)
         if self.refine:
             value = value + gauge.jacobian @ gauge.motion(value)
-            variance = gauge.variances(local) + gauge(coating) ** 2
+            variance = gauge.variances(local) + gauge(coating) ** 2 + gauge(growth) ** 2
         else:
             rows = jacobian(gauge.nodes, gauge.normals, alignments[0].origin)
-            variance = local + np.einsum("ij,jk,ik->i", rows, alignments[0].covariance, rows) + coating**2
+            variance = local + np.einsum("ij,jk,ik->i", rows, alignments[0].covariance, rows) + coating**2 + growth**2
         variance = variance + self.calibration**2 + nominal.chord**2 / 3
         full_value, full_sigma = np.full(len(fit.value), np.nan), np.full(len(fit.value), np.nan)
         full_value[seen], full_sigma[seen] = value, np.sqrt(variance)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from inspect3d.arrays import Booleans, Floats, booleans, floats
+from inspect3d.camera import View
 from inspect3d.figure import Figure
 from inspect3d.outcome import MeasurementError, Status
 from inspect3d.pose import Pose
@@ -71,6 +72,18 @@ class Alignment:
     def __call__(self, points: Floats) -> Floats:
         """Return measured points (n, 3) mm in the CAD frame."""
         return self.cad_from_measured(self.scale * points)
+
+    def views(self, views: tuple[View, ...]) -> tuple[View, ...]:
+        """Return cameras that stand in the frame and scale of the measured points in the CAD frame."""
+        back = self.cad_from_measured.inverse()
+        return tuple(
+            replace(
+                view,
+                camera_from_cad=Pose(view.camera_from_cad.rotation, self.scale * view.camera_from_cad.translation)
+                @ back,
+            )
+            for view in views
+        )
 
     @property
     def count(self) -> int:

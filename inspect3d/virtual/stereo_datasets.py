@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from math import radians
 from types import MappingProxyType
 
 import numpy as np
@@ -40,6 +41,7 @@ PLACED = 'alignment = { start = "identity", refine = false }\n'
 FOCAL = "focal = $focal                   # px, a few per cent off\n"
 MILLED_MIDDLE = (50.0, 35.0, 26.0)
 LANDMARKS = "landmarks = [\n$landmarks]\n"
+AROUND = StereoRig(cameras=8, angle=radians(40.0))
 
 
 def smooth_stereo(
@@ -59,6 +61,14 @@ def milled_stereo(seed: int, rig: StereoRig | None = None, scallop: float = 0.01
     recipe = HEAD.format(title="Milled block", name="milled-stereo", element_size=2.0) + CAMERAS + PLACED
     deviation = machining(pitch=4.0, scallop=scallop)
     return photographed(milled(), deviation, rig or StereoRig(), MILLED_MIDDLE, seed, recipe)
+
+
+def milled_photographs(seed: int, rig: StereoRig | None = None, name: str = "milled-photographs") -> PictureDataset:
+    """Return eight photographs of the milled block from a cone, 15 degrees from each to the next; cameras known."""
+    dataset = milled_stereo(seed, rig or AROUND)
+    recipe = dataset.recipe.replace(PLACED, "").replace("milled-stereo", name)
+    recipe = recipe.replace('name = "stereo"', 'name = "photographs"').replace('"stereocorrelation"', '"colmap"')
+    return replace(dataset, recipe=recipe)
 
 
 def knowing(dataset: PictureDataset, knowledge: CameraKnowledge | None, picked: int = 6) -> PictureDataset:
@@ -100,5 +110,7 @@ PHOTOGRAPHED: Mapping[str, Callable[[int], PictureDataset]] = MappingProxyType(
         "smooth-stereo-lenses": _knowing(LensesKnown(), "smooth-stereo-lenses"),
         "smooth-stereo-picks": _knowing(None, "smooth-stereo-picks"),
         "milled-stereo": milled_stereo,
+        "milled-photographs": milled_photographs,
+        "milled-photographs-small": lambda seed: milled_photographs(seed, AROUND.halved(), "milled-photographs-small"),
     }
 )

@@ -1,0 +1,1 @@
+"""From photographs to points: tied features, cameras where they are unknown, patches that fit all pictures."""
