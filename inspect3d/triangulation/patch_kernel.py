@@ -1,10 +1,10 @@
 """Patches of the surface moved until all photographs agree on them: a numba kernel, arrays only.
 
-A patch is a small square of the tangent plane around a point, `2 half + 1` samples along each side. Its height along
-the normal and its two slopes are fitted by Gauss-Newton: z_k, the grey levels that view k shows there, of zero mean
-and unit deviation, are to equal their mean T over the views. If the patch stands wrong by h, view k sees the texture
-shifted by d_k h over the patch, d_k being the motion of its picture by a unit of height, carried back onto the patch.
-With e_k = d_k - mean d and f = (1, i, j) for the three unknowns,
+A patch is a small square of the surface around a point, `2 half + 1` samples along each side. Its height along the
+normal, its two slopes and its three curvatures are fitted by Gauss-Newton: z_k, the grey levels that view k shows
+there, of zero mean and unit deviation, are to equal their mean T over the views. If the patch stands wrong by h, view k
+sees the texture shifted by d_k h over the patch, d_k being the motion of its picture by a unit of height, carried back
+onto the patch. With e_k = d_k - mean d and f = (1, i, j, i², i j, j²) for the unknowns,
 
     N = sum (grad T . e_k)² f f',    N x = - sum (grad T . e_k) f z_k,    cov x = s² N⁻¹
 
@@ -34,6 +34,7 @@ STEEPEST = 0.35  # largest slope that a patch may take on
 STILL = 0.003  # px, a step in the pictures below which a patch rests
 INTERPOLATED = 1.0 / 0.76  # variance of a pixel over that of a cubic B-spline between pixels, on average
 FEWEST = 2
+UNKNOWNS = 6
 
 
 @njit(cache=True)
@@ -43,6 +44,7 @@ def _read(
     normal: Floats,
     across: Floats,
     along: Floats,
+    bend: Floats,
     half: int,
     steepest: float,
     pictures: Pictures,
@@ -86,7 +88,9 @@ def _read(
     mean = 0.0
     for i in range(-half, half + 1):
         for j in range(-half, half + 1):
-            value, gx, gy = sample_cubic(levels, width, height, x + i * xi + j * xj, y + i * yi + j * yj)
+            rise = i * i * bend[0] + i * j * bend[1] + j * j * bend[2]
+            u, v = x + i * xi + j * xj + rise * xh, y + i * yi + j * yj + rise * yh
+            value, gx, gy = sample_cubic(levels, width, height, u, v)
             grey[n] = value
             gradient[n, 0] = gx * xi + gy * yi
             gradient[n, 1] = gx * xj + gy * yj
@@ -125,7 +129,7 @@ def _fit(
     grey, gradient, shift = np.empty((views, n)), np.empty((views, n, 2)), np.empty((views, 2))
     seen, mean, slope = np.empty(views, np.bool_), np.empty(n), np.empty((n, 2))
     helper, across, along, at = np.zeros(3), np.empty(3), np.empty(3), np.empty(3)
-    steep = np.empty(n)
+    weight, pull, basis = np.empty(n), np.empty(n), np.ones(UNKNOWNS)
     smallest = 0
     for a in range(3):
         if abs(normal[a]) < abs(normal[smallest]):
@@ -139,16 +143,16 @@ def _fit(
     for a in range(3):
         along[a] = normal[(a + 1) % 3] * across[(a + 2) % 3] - normal[(a + 2) % 3] * across[(a + 1) % 3]
     up = normal.copy()
-    h, p, q = 0.0, 0.0, 0.0
+    h, p, q, bend = 0.0, 0.0, 0.0, np.zeros(3)
     taking, likeness, variance = 0, 0.0, 0.0
     for step in range(steps):
         for a in range(3):
             at[a] = point[a] + h * up[a]
-        leaning_across, leaning_along = across + p * pitch * up, along + q * pitch * up
+        lean_across, lean_along = across + p * pitch * up, along + q * pitch * up
         taking = 0
         for k in range(views):
             seen[k] = allowed[k] and _read(
-                k, at, up, leaning_across, leaning_along, half, steepest, pictures, cameras, (grey, gradient, shift)
+                k, at, up, lean_across, lean_along, bend, half, steepest, pictures, cameras, (grey, gradient, shift)
             )
             taking += seen[k]
         for turn in range(2):
@@ -180,46 +184,47 @@ def _fit(
             if seen[k]:
                 middle_x += shift[k, 0] / taking
                 middle_y += shift[k, 1] / taking
-        matrix, right, squares, likeness, largest, spread = np.zeros((3, 3)), np.zeros(3), 0.0, 1.0, 0.0, 0.0
+        squares, likeness, largest, spread = 0.0, 1.0, 0.0, 0.0
+        weight[:] = 0.0
+        pull[:] = 0.0
+        length = math.sqrt(max((mean * mean).sum(), 1e-12) * n)
         for k in range(views):
             if not seen[k]:
                 continue
             ex, ey = shift[k, 0] - middle_x, shift[k, 1] - middle_y
             largest = max(largest, math.sqrt(ex * ex + ey * ey))
             spread += ex * ex + ey * ey
-            own = 0.0
-            m = 0
-            for i in range(-half, half + 1):
-                for j in range(-half, half + 1):
-                    steep[m] = slope[m, 0] * ex + slope[m, 1] * ey
-                    rest = grey[k, m] - mean[m]
-                    squares += rest * rest
-                    own += grey[k, m] * mean[m]
-                    g = steep[m] * rest
-                    w = steep[m] * steep[m]
-                    right[0] -= g
-                    right[1] -= g * i
-                    right[2] -= g * j
-                    matrix[0, 0] += w
-                    matrix[1, 0] += w * i
-                    matrix[2, 0] += w * j
-                    matrix[1, 1] += w * i * i
-                    matrix[2, 1] += w * i * j
-                    matrix[2, 2] += w * j * j
-                    m += 1
-            likeness = min(likeness, own / math.sqrt(max((mean * mean).sum(), 1e-12) * n))
-        if matrix[0, 0] <= 0.0 or matrix[1, 1] <= 0.0 or matrix[2, 2] <= 0.0:
-            return False
-        freedom = (taking - 1) * (n - 2) - 3
-        sigma = INTERPOLATED * squares / max(freedom, 1)
-        for a in range(3):
+            for m in range(n):
+                steep = slope[m, 0] * ex + slope[m, 1] * ey
+                rest = grey[k, m] - mean[m]
+                squares += rest * rest
+                weight[m] += steep * steep
+                pull[m] -= steep * rest
+            likeness = min(likeness, (grey[k] * mean).sum() / length)
+        matrix, right, first = np.zeros((UNKNOWNS, UNKNOWNS)), np.zeros(UNKNOWNS), np.zeros(UNKNOWNS)
+        first[0] = 1.0
+        m = 0
+        for i in range(-half, half + 1):
+            for j in range(-half, half + 1):
+                basis[1], basis[2], basis[3], basis[4], basis[5] = i, j, i * i, i * j, j * j
+                for a in range(UNKNOWNS):
+                    right[a] += pull[m] * basis[a]
+                    for b in range(a + 1):
+                        matrix[a, b] += weight[m] * basis[a] * basis[b]
+                m += 1
+        for a in range(UNKNOWNS):
+            if matrix[a, a] <= 0.0:
+                return False
             matrix[a, a] *= 1.0 + 1e-9
-        inverse = solve_spd(matrix.copy(), np.array([1.0, 0.0, 0.0]))
+        freedom = (taking - 1) * (n - 2) - UNKNOWNS
+        sigma = INTERPOLATED * squares / max(freedom, 1)
+        inverse = solve_spd(matrix.copy(), first)
         variance = sigma * inverse[0] + systematic**2 / spread
         motion = solve_spd(matrix, right)
         h += motion[0]
         p += motion[1] / pitch
         q += motion[2] / pitch
+        bend += motion[3:]
         if abs(h) > reach * pitch or abs(p) > STEEPEST or abs(q) > STEEPEST or not math.isfinite(h):
             return False
         if step >= 3 and abs(motion[0]) * largest < STILL:

@@ -12,10 +12,12 @@ from inspect3d.arrays import Booleans, Floats, Integers, unit
 from inspect3d.camera import View
 from inspect3d.correlation.picture import Pictures, Stack
 
-NEIGHBOURS = 12
+NEIGHBOURS, FEW = 12, 9
 AROUND = 6  # directions in which the surface is followed
 CLOSE, TOO_CLOSE = 0.8, 0.7  # spacings; a new patch begins no closer to another, and is dropped if it ends closer
-WILD = 4.0  # usual uncertainties beyond which a patch is left out
+WILD = 4.0  # usual uncertainties, and usual gaps to the neighbours' planes, beyond which a patch is left out
+OFF = 0.25  # px, gap to the planes of most neighbours that is always allowed
+MAD = 1.4826
 ALONE = 2.5  # spacings within which a patch has two neighbours at the least
 
 
@@ -54,9 +56,10 @@ class Patched:
 class FitPatches:
     """Fit patches of the surface to all photographs at once, at tie points and between them.
 
-    Each patch is a square window on the tangent plane whose height and slopes make the photographs agree (least-squares
-    matching under the constraint of the known cameras; see `patch_kernel`). Windows hardly overlap, so that the errors
-    of neighbours are independent. From each patch the surface is followed to the sides until the photographs disagree.
+    Each patch is a square window on the surface whose height, slopes and curvatures make the photographs agree
+    (least-squares matching under the constraint of the known cameras; see `patch_kernel`). Windows hardly overlap, so
+    that the errors of neighbours are independent. From each patch the surface is followed to the sides until the
+    photographs disagree.
 
     Parameters
     ----------
@@ -138,9 +141,7 @@ class FitPatches:
 
     def _beside(self, newest: Patched, surface: Patched, views: Sequence[View]) -> tuple[Floats, Floats]:
         """Return where new patches may begin: beside the newest ones, on their tangent planes, where none is yet."""
-        helper = np.where(np.abs(newest.normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-        across = unit(np.cross(newest.normals, helper))
-        along = np.cross(newest.normals, across)
+        across, along = _tangents(newest.normals)
         reach = (self.spacing * _pitch(newest.points, views))[:, None]
         turns = np.arange(AROUND) * 2 * np.pi / AROUND
         begun = np.concatenate([newest.points + reach * (np.cos(t) * across + np.sin(t) * along) for t in turns])
@@ -152,12 +153,23 @@ class FitPatches:
         return begun[kept], normals[kept]
 
     def _sound(self, surface: Patched, views: Sequence[View]) -> Patched:
-        """Return the patches that are as certain as usual and have neighbours."""
-        if len(surface) < 3:
+        """Return the patches that are as certain as usual, have neighbours, and lie on the planes of most of them."""
+        if len(surface) < FEW:
             return surface
-        reach = ALONE * self.spacing * _pitch(surface.points, views)
-        second = cKDTree(surface.points).query(surface.points, 3)[0][:, 2]
-        return surface.taken((surface.sigma < WILD * np.median(surface.sigma)) & (second < reach))
+        pitch = _pitch(surface.points, views)
+        gaps, near = cKDTree(surface.points).query(surface.points, FEW)
+        beside = ~(gaps[:, 2] > ALONE * self.spacing * pitch)
+        away = surface.points[:, None] - surface.points[near[:, 1:]]
+        off = np.abs(np.median(np.einsum("nki,nki->nk", away, surface.normals[near[:, 1:]]), axis=1))
+        usual = surface.sigma < WILD * np.median(surface.sigma)
+        return surface.taken(beside & usual & (off < np.maximum(OFF * pitch, WILD * MAD * np.median(off))))
+
+
+def _tangents(normals: Floats) -> tuple[Floats, Floats]:
+    """Return two directions across each of the normals (n, 3) and each other, (n, 3) both."""
+    helper = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    across = unit(np.cross(normals, helper))
+    return across, np.cross(normals, across)
 
 
 def _pitch(points: Floats, views: Sequence[View]) -> Floats:
