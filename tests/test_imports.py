@@ -48,7 +48,13 @@ PIPELINE = (
 )
 """The modules of inspect3d in the order of the pipeline; a module imports from its own stage and from earlier ones."""
 
-ASIDE = {"virtual": "deviate", "web": "inspection", "correlation": "deviate", "starting": "deviate", "triangulation": "deviate"}
+ASIDE = {
+    "virtual": "deviate",
+    "web": "inspection",
+    "correlation": "deviate",
+    "starting": "deviate",
+    "triangulation": "deviate",
+}
 """Packages beside the pipeline, which no stage before this one's successors imports."""
 
 HEAVY = {
