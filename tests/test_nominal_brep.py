@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import re
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +17,7 @@ from inspect3d.nominal.load import load_nominal
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.nominal.sharp import sides_of
 from inspect3d.nominal.step_iges import read_brep, silence
+from inspect3d.nominal.survived import survived
 from inspect3d.nominal.tessellation import tessellated
 from inspect3d.outcome import InputError
 
@@ -273,6 +277,20 @@ def test_what_is_not_step_or_iges_is_refused_by_name(tmp_path: Path, name: str, 
     with pytest.raises(InputError, match=says) as refusal:
         load_nominal(path)
     assert name in str(refusal.value)
+
+
+def test_a_step_file_that_crashes_opencascade_is_refused(tmp_path: Path) -> None:
+    path = saved(cylinder(1.0, 2.0), tmp_path / "part.step")
+    curve = re.compile(rb"(DEFINITIONAL_REPRESENTATION\('',)\((#\d+)\),(#\d+)")
+    path.write_bytes(curve.sub(rb"\1(\3),\2", path.read_bytes(), count=1))
+    with pytest.raises(InputError, match=r"part\.step is damaged: OpenCASCADE crashes"):
+        load_nominal(path)
+
+
+def test_a_crash_takes_the_child_only_and_an_exception_is_no_crash() -> None:
+    assert not survived(lambda: os.kill(os.getpid(), signal.SIGSEGV))
+    assert survived(lambda: 1 // 0)
+    assert survived(lambda: None)
 
 
 def test_a_step_file_without_faces_is_refused(tmp_path: Path) -> None:

@@ -115,14 +115,13 @@ def _transferred(path: Path, is_step: bool) -> Any:
         handed = Path(folder) / "shape"
 
         def hand_over() -> None:
-            whole = BinTools.Write_s(_translated(path, is_step), str(handed.with_suffix(".part")))
-            if whole:
-                handed.with_suffix(".part").rename(handed)
+            if BinTools.Write_s(_translated(path, is_step), f"{handed}.part"):
+                Path(f"{handed}.part").rename(handed)
 
         if not survived(hand_over):
             raise InputError(f"{path.name} is damaged: OpenCASCADE crashes when it reads it; export it again.")
         if not handed.exists():
-            return _translated(path, is_step)
+            return _translated(path, is_step)  # which says what is wrong
         shape = TopoDS_Shape()
         BinTools.Read_s(shape, str(handed))
         return shape
