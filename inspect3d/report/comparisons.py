@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -65,7 +66,10 @@ def draw_comparisons(record: Record, folder: Path, views: Views, layout: Layout)
         words = "All methods: their deviation maps on the diagonal, their differences above it (row minus column), "
         blocks.append(Shown("matrix.png", words + "the figures of each pair below it"))
     for k, comparison in enumerate(record.comparisons, start=1):
-        blocks += [Heading(f"{comparison.a} and {comparison.b}"), Bullets(comparison.words)]
+        blocks += [
+            Heading(f"{comparison.a} and {comparison.b}"),
+            Bullets(tuple(_typeset(words) for words in comparison.words)),
+        ]
         if comparison.mean is not None:
             blocks += [table_of(_figures(comparison)), *_regions(comparison)]
             blocks += _draw(record, comparison, k, folder, views, layout)
@@ -165,6 +169,11 @@ def _draw(record: Record, comparison: Comparison, k: int, folder: Path, views: V
 
 def _seen(record: Record, views: Views, nodes: np.ndarray) -> tuple[Viewpoint, ...]:
     return views.showing(nodes, record.nominal.mesh.areas)
+
+
+def _typeset(words: str) -> str:
+    """Return a sentence with true minus signs before its figures."""
+    return re.sub(r"(?<![\w-])-(?=\d)", "−", words)
 
 
 def _micro(length: float | None, sign: bool = True) -> str:

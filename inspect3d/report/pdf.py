@@ -12,6 +12,9 @@ from inspect3d.report.blocks import Document, as_data, numbered_files
 from inspect3d.report.fonts import FAMILIES, MONO, font_folder, unprintable
 from inspect3d.report.page import asset
 
+SHORT = ("rule", "provenance")
+"""Chapters that begin on the page where the one before ends."""
+
 
 def pdf(document: Document, pictures: Path, moment: datetime) -> bytes:
     """Return the report as PDF, A4: the same document, pictures and moment give the same bytes on a machine.
@@ -29,7 +32,7 @@ def pdf(document: Document, pictures: Path, moment: datetime) -> bytes:
     data = as_data(document)
     words = json.dumps(data, ensure_ascii=False)
     missing = unprintable(words)
-    content = {"document": data, "fonts": FAMILIES, "mono": MONO, "note": _note(missing)}
+    content = {"document": data, "fonts": FAMILIES, "mono": MONO, "note": _note(missing), "after": SHORT}
     with TemporaryDirectory() as root:
         _put_pictures(data, pictures, Path(root))
         compiler = typst.Compiler(
