@@ -11,6 +11,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from inspect3d.camera import Camera, View
+from inspect3d.compare.feature_estimate import FeatureEstimate
+from inspect3d.compare.segmentation import Segmentation
 from inspect3d.deviate.deviation import Deviation
 from inspect3d.deviate.errors_file import read_errors
 from inspect3d.inspection import compared, versions
@@ -119,6 +121,8 @@ def _run(finished: Finished, names: Mapping[str, str]) -> _Run:
                 errors = read_errors(finished.folder / f"{name}_errors.npz")
                 mesh = replace(found.mesh, face=errors.face)
                 part = replace(part, covariance=errors.covariance, sources=errors.sources, **_map(found))
+                if part.deviation is not None:
+                    part = replace(part, regions=Segmentation()(part.deviation, errors.covariance, mesh))
                 part = replace(part, **_points(finished.folder / f"{name}_points.vtp"))
             parts.append(part)
     except (KeyError, TypeError, ValidationError, ValueError) as error:
@@ -145,6 +149,7 @@ def _part(values: Mapping[str, Any], name: str) -> MeasuredPart:
         noise=values["noise"],
         views=tuple(map(_view, values["cameras"])),
         hidden=tuple(values["hidden"]),
+        features=tuple(map(_feature, values["features"])),
         contributions=tuple((source, size, words) for source, size, words in values["contributions"]),
         remarks=tuple(values["remarks"]),
     )
@@ -184,6 +189,10 @@ def _alignment(values: Mapping[str, Any]) -> Alignment:
         free=tuple(FreeMotion(free["words"], np.array(free["direction"])) for free in values["free"]),
         candidates=tuple(map(_candidate, values["candidates"])),
     )
+
+
+def _feature(values: Mapping[str, Any]) -> FeatureEstimate:
+    return FeatureEstimate(**{key: value for key, value in values.items() if key != "resolved"})
 
 
 def _candidate(values: Mapping[str, Any]) -> Candidate:

@@ -9,6 +9,8 @@ import numpy as np
 
 from inspect3d.alignment_choice import fitted_to, sensitivity_of
 from inspect3d.arrays import Booleans
+from inspect3d.compare.features import features_of_nodes, features_of_points
+from inspect3d.compare.segmentation import Segmentation
 from inspect3d.compare.tolerances import excluded, tolerances
 from inspect3d.compare.verdict import verdict
 from inspect3d.deviate.deviate import Deviate
@@ -120,6 +122,8 @@ def _of_clouds(
     return replace(
         _judged(ended, found.deviation, found.alignments, table, recipe, nominal, measurement.scale_known),
         covariance=found.covariance,
+        regions=Segmentation()(found.deviation, found.covariance, nominal.mesh),
+        features=features_of_points(recipe.part.features, nominal.mesh, found.points_cad, found.distance, found.noise),
         points_cad=found.points_cad,
         point_deviation=found.distance,
         noise=found.noise,
@@ -155,6 +159,8 @@ def _of_nodes(
     return replace(
         _judged(ended, found.deviation, (found.alignment,), table, recipe, nominal, measurement.scale_known),
         covariance=found.covariance,
+        regions=Segmentation()(found.deviation, found.covariance, nominal.mesh),
+        features=features_of_nodes(recipe.part.features, nominal.mesh, found.deviation, found.covariance),
         views=found.views,
         residual=measurement.residual,
         hidden=measurement.hidden,

@@ -14,6 +14,7 @@ from inspect3d.measure import Files
 from inspect3d.outcome import InputError
 from inspect3d.readable import pictures_in, readable
 from inspect3d.recipe_alignment import Start
+from inspect3d.recipe_feature import Feature
 from inspect3d.recipe_types import (
     Direction,
     Interval,
@@ -45,6 +46,7 @@ class Part(Table):
     flip: bool = False
     regions: tuple[Region, ...] = ()
     exclude: tuple[Region, ...] = ()
+    features: tuple[Feature, ...] = ()
 
     _tolerance = field_validator("tolerance")(rising)
 
@@ -53,11 +55,15 @@ class Part(Table):
         brep = self.cad.lower().endswith(BREP_SUFFIXES)
         if brep and self.units != "mm":
             raise ValueError(f"units = {self.units!r} is for mesh files; {self.cad} carries its own: remove the key")
-        if not brep and any(region.faces for region in self.regions + self.exclude):
+        if not brep and any(region.faces for region in self.regions + self.exclude + self._places):
             raise ValueError(f"regions by faces need a STEP or IGES file, and {self.cad} is a mesh: use boxes")
         if any(region.tolerance for region in self.exclude):
             raise ValueError("what exclude names has no tolerance")
         return self
+
+    @property
+    def _places(self) -> tuple[Region, ...]:
+        return tuple(feature.place for feature in self.features)
 
 
 class Coating(Table):

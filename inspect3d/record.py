@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 from inspect3d.arrays import Floats, Integers
 from inspect3d.camera import View
 from inspect3d.compare.comparison import Comparison
+from inspect3d.compare.deviation_region import DeviationRegion
+from inspect3d.compare.feature_estimate import FeatureEstimate
 from inspect3d.compare.sensitivity import Sensitivity
 from inspect3d.deviate.deviation import Deviation
 from inspect3d.deviate.map_covariance import MapCovariance
@@ -35,6 +37,8 @@ class MeasuredPart:
     deviation : the map, or None where there is none
     covariance : how the errors of the map hang together; None where there is no map
     sources : the files it was measured from, name by SHA-256
+    regions : where the deviation stands out, largest volume first
+    features : what the recipe asks for in marked places
     sensitivity : how much the map depends on the choice of the alignment; None where there is no map
     verdict : (n,) 0 none, 1 conform, 2 undecided, 3 nonconform, per node; None without a tolerance
     points_cad : (k, 3) mm, the measured points in the CAD frame in the order of the files; None for stereo methods
@@ -59,6 +63,8 @@ class MeasuredPart:
     deviation: Deviation | None = None
     covariance: MapCovariance | None = None
     sources: Mapping[str, str] = field(default_factory=dict)
+    regions: tuple[DeviationRegion, ...] = ()
+    features: tuple[FeatureEstimate, ...] = ()
     sensitivity: Sensitivity | None = None
     verdict: Integers | None = None
     points_cad: Floats | None = None

@@ -32,7 +32,7 @@ PIPELINE = (
     {"measure"},
     {"register"},
     {"deviate"},
-    {"complaint", "recipe_types", "recipe_alignment", "recipe"},
+    {"complaint", "recipe_types", "recipe_alignment", "recipe_feature", "recipe"},
     {"compare"},
     {"record"},
     {"report"},

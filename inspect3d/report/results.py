@@ -13,6 +13,7 @@ import numpy as np
 from inspect3d.camera import View
 from inspect3d.compare.comparison import Comparison
 from inspect3d.compare.deviation_region import DeviationRegion
+from inspect3d.compare.feature_estimate import FeatureEstimate
 from inspect3d.compare.sensitivity import Sensitivity
 from inspect3d.compare.tolerances import tolerances
 from inspect3d.deviate.statistics import Statistics, percentiles
@@ -97,6 +98,8 @@ def _measurement(record: Record, mesh: InspectionMesh, part: MeasuredPart) -> di
         "verdict": verdict_shares(record, part) if has_map else None,
         "labels": [_label(reading) for reading in readings(mesh, part, record.recipe.report.labels)],
         "noise": part.noise,
+        "regions": [_region(region) for region in part.regions],
+        "features": [_feature(feature) for feature in part.features],
         "sensitivity": _sensitivity(part.sensitivity) if part.sensitivity else None,
         "hidden": list(part.hidden),
         "contributions": [list(each) for each in part.contributions],
@@ -219,6 +222,10 @@ def _region(region: DeviationRegion) -> dict[str, Any]:
         "sigma": region.sigma,
         "p_value": region.p_value,
     }
+
+
+def _feature(feature: FeatureEstimate) -> dict[str, Any]:
+    return asdict(feature) | {"resolved": feature.resolved}
 
 
 def _label(reading: Reading) -> dict[str, Any]:
