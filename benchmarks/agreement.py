@@ -5,8 +5,10 @@
     python benchmarks/agreement.py stereo --seeds 5 --defect
 
 `scans`: two simulated scans of the bracket that differ in noise and density. `stereo`: photographs of the freeform
-sheet, a new speckle, rig and noise for each seed, measured by stereocorrelation, against a scan of it; `systematic` is 0, since the virtual
-pictures have no shift that no model explains. The part has a form error; with `--defect` one of the two measurements, the second, has a local defect of 60 um and 8 mm width in it.
+sheet, a new speckle, rig and noise for each seed, measured by stereocorrelation, against a scan of it; `systematic` is
+0, since the virtual pictures have no shift that no model explains. The part has a form error; with `--defect` the
+second of the two measurements has a local defect of 60 um and 8 mm width in it as well.
+
 Printed are the rms of E_n and the share of nodes above 1 over all seeds (0.5 and 4.6 % where the uncertainties are
 true), and how many seeds show a region where none is; with a defect the share of the nodes with E_n above 1 where the
 defect exceeds 4 sigma of the difference, the share where it is below a tenth of sigma, and how many seeds show the
