@@ -108,7 +108,8 @@ def _draw_part(record: Record, folder: Path, views: Views) -> Shown:
     picture = Picture(mesh, Layout(*SIZE), caption)
     with views.window(np.full(len(mesh), np.nan), None, picture.layout.window) as window:
         picture.taken(window, viewpoint).save(folder / "part.png")
-    return Shown("part.png", "The part as designed", viewpoint)
+    fewer = f"; pictures show {views.drawn.words}" if views.drawn.words else ""
+    return Shown("part.png", f"The part as designed{fewer}", viewpoint)
 
 
 def _draw_measurement(record: Record, part: MeasuredPart, folder: Path, views: Views) -> list[Shown]:

@@ -71,7 +71,7 @@ def viewer_data(record: Record, start: Viewpoint) -> str:
         "crease": _packed(mesh.crease[detail.nodes], np.uint8),
         "unmeasured": list(UNMEASURED),
         "back": list(BACK),
-        "detail": detail.words,
+        "detail": f"The 3-D views show {detail.words}; figures and tables hold all." if detail.words else "",
         "methods": len(with_map),
         "maps": maps,
     }
