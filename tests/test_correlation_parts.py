@@ -18,6 +18,7 @@ from inspect3d.correlation.normal import facets
 from inspect3d.correlation.picture import Pictures, Stack
 from inspect3d.correlation.reading_kernel import lens_slope
 from inspect3d.correlation.scene import scene
+from inspect3d.correlation.still import in_gauge, stilled
 from inspect3d.correlation.visibility import visibility
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.nominal.surface import Surface
@@ -184,6 +185,43 @@ def test_two_free_projection_matrices_hide_fifteen_motions_that_priors_name():
     assert len(system.unseen) == 0
     told = sum(motion.prior for motion in hidden_motions(seen, system, free, 0.0))
     assert told > 7.5  # of eight; the elements say a little about the last
+
+
+def test_a_stilled_step_slides_no_more_than_it_must_and_shows_the_same_disparities(wavy):
+    _, views, seen, _ = wavy
+    free = Freedom("free", (Lens(30.0, 10.0),) * 2, views, seen.centre)
+    random = np.random.default_rng(0)
+    cameras = 0.1 * free.scale(views, seen.nodes) * random.normal(size=free.unknowns)
+    shape = random.normal(0.0, 1e-3, len(seen.nodes))
+    plain = slides(seen, views, free.moved(views, cameras), shape)
+    shape, cameras = stilled(seen, free, views, np.zeros(len(seen.nodes)), shape, cameras)
+    still = slides(seen, views, free.moved(views, cameras), shape)
+    assert plain[0] - plain[1] == pytest.approx(still[0] - still[1], abs=2e-2 * np.abs(plain[0] - plain[1]).max())
+    assert np.abs(still.mean(axis=(0, 1))).max() < 0.02 * np.abs(plain.mean(axis=(0, 1))).max()
+
+
+def test_a_state_in_the_gauge_has_no_motion_of_the_part_and_shows_the_same_pictures(wavy):
+    _, views, seen, _ = wavy
+    free = Freedom("free", (Lens(),) * 2, views, seen.centre)
+    gauge = gauge_of(seen, free)
+    deviation = 1e-3 * gauge @ np.random.default_rng(0).normal(size=gauge.shape[1])
+    moved, left = in_gauge(seen, free, views, deviation)
+    assert left == pytest.approx(np.zeros(len(left)), abs=1e-12)
+    slid = slides(seen, views, moved, -deviation)
+    assert slid[0] == pytest.approx(slid[1], abs=1e-2 * np.abs(slid).max())
+
+
+def slides(seen, views, after, shape):
+    """Return how far over the surface each view's picture of each node slides in a step, (2, n, 2) mm."""
+    first = np.cross(seen.normals, [1.0, 0.0, 0.0])
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    found = []
+    for view, moved in zip(views, after, strict=True):
+        here = view.project(seen.nodes)
+        ways = [(view.project(seen.nodes + 1e-4 * t) - here) / 1e-4 for t in (first, np.cross(seen.normals, first))]
+        change = moved.project(seen.nodes + shape[:, None] * seen.normals) - here
+        found.append(np.einsum("nij,nj->ni", np.linalg.inv(np.stack(ways, axis=2)), change))
+    return np.stack(found)
 
 
 def camera_system(seen, stack, views, free):

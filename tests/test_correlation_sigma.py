@@ -85,6 +85,26 @@ def test_with_known_cameras_scatter_over_the_seeds_is_what_was_claimed(nominal, 
     assert high == pytest.approx(spread[1], abs=0.15)
 
 
+def test_a_step_widens_the_claim_beside_it_and_nowhere_else(nominal):
+    edge, views = 26.0, rig()
+    speckle = Speckle.drawn(np.random.default_rng(0), 0.7)
+
+    def step(x, y):
+        return 0.1 * (np.asarray(x) > edge)
+
+    exact = views, [picture(view, speckle, step) for view in views]
+    shape = Correlate(pixels=4.0)(nominal, photographs(exact, np.random.default_rng(1)), views)
+    x, y = shape.scene.nodes[:, :2].T
+    sigma = np.sqrt(shape.uncertainty.variances)
+    z = (shape.values - step(x, y)) / sigma
+    beside = shape.sound & (np.abs(x - edge) < 3.0)
+    away = shape.sound & (np.abs(x - edge) > 6.0)
+    assert shape.uncertainty.correlated < 1.5
+    assert 0.85 < rms(z[away]) < 1.15
+    assert np.median(sigma[beside]) > 3 * np.median(sigma[away])
+    assert rms(z[beside]) < 2.0
+
+
 def test_self_calibrated_the_rest_and_the_weak_motions_are_as_large_as_claimed(nominal, exact):
     z, distance, modes = [], 0.0, 0
     for seed in range(SEEDS):

@@ -18,6 +18,7 @@ from inspect3d.correlation.picture import Interpolation, Pictures
 from inspect3d.correlation.scene import Scene, scene
 from inspect3d.correlation.shape import Shape
 from inspect3d.correlation.solver import COARSE, ON_NOMINAL, Level, Solver, State, Step, held
+from inspect3d.correlation.still import in_gauge
 from inspect3d.correlation.texture import speckle_size
 from inspect3d.correlation.uncertainty import Systematic, needed_columns, uncertainty
 from inspect3d.nominal.nominal import Nominal
@@ -125,6 +126,9 @@ class Correlate:
         sure = uncertainty(seen, found, state.views, state.weights, last, systematic)
         local = float(np.sqrt(np.median(sure.system.nodal.inverse_diagonal)))
         motions = hidden_motions(seen, sure.system, last, local)
+        if last.poses != "known":
+            found_views, deviation = in_gauge(seen, last, state.views, state.deviation)
+            state = replace(state, views=found_views, deviation=deviation)
         return Shape(nominal.mesh, seen, state, sure, motions, found, calibrated, systematic)
 
     def _scene(self, nominal: Nominal, views: Sequence[View], masks: Sequence[Booleans | None] | None) -> Scene:

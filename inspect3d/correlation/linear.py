@@ -40,7 +40,7 @@ def gauge_of(scene: Scene, freedom: Freedom) -> Floats:
     """
     if freedom.poses == "known":
         return np.zeros((len(scene.nodes), 0))
-    left, values, _ = _motions(scene, freedom)
+    left, values, _ = motions_of(scene, freedom)
     return left[:, values**2 > FREE * values[0] ** 2]
 
 
@@ -51,19 +51,24 @@ def slides_of(scene: Scene, freedom: Freedom, views: Sequence[View]) -> Floats:
     """
     if freedom.poses == "known":
         return np.zeros((freedom.unknowns, 0))
-    _, values, right = _motions(scene, freedom)
-    motions = right[values**2 <= FREE * values[0] ** 2]
-    motions[:, 3:6] += np.cross(motions[:, :3], freedom.origin - scene.centre)
+    _, values, right = motions_of(scene, freedom)
+    return moving_cameras(scene, freedom, views, right[values**2 <= FREE * values[0] ** 2])
+
+
+def moving_cameras(scene: Scene, freedom: Freedom, views: Sequence[View], motions: Floats) -> Floats:
+    """Return the changes of the cameras (m, k) that make motions (k, 6) or (k, 7) of the part about its centre."""
+    turned = motions.copy()
+    turned[:, 3:6] += np.cross(motions[:, :3], freedom.origin - scene.centre)
     bodies = 1 if freedom.poses == "common" else len(views)
-    slides = np.zeros((freedom.unknowns, len(motions)))
+    changes = np.zeros((freedom.unknowns, len(motions)))
     for k in range(bodies):
-        slides[6 * k : 6 * k + 6] = motions[:, :6].T
+        changes[6 * k : 6 * k + 6] = turned[:, :6].T
         if freedom.poses == "free":  # growth by g about the centre looks like a shift by -g (centre - camera)
-            slides[6 * k + 3 : 6 * k + 6] -= np.outer(scene.centre - views[k].centre, motions[:, 6])
-    return slides
+            changes[6 * k + 3 : 6 * k + 6] -= np.outer(scene.centre - views[k].centre, turned[:, 6])
+    return changes
 
 
-def _motions(scene: Scene, freedom: Freedom) -> tuple[Floats, Floats, Floats]:
+def motions_of(scene: Scene, freedom: Freedom) -> tuple[Floats, Floats, Floats]:
     """Return the singular values of the normal motions (n, 6) or, with growth, (n, 7); the fields; the motions."""
     length = spread(scene.nodes, np.ones(len(scene.nodes)), scene.centre)
     units = np.array([length] * 3 + [1.0] * 3 + [length] * (freedom.poses == "free"))

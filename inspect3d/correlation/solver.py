@@ -18,6 +18,7 @@ from inspect3d.correlation.linear import noise_of, robust, slides_of, stiffened,
 from inspect3d.correlation.normal import Facets, facets
 from inspect3d.correlation.picture import Pictures, Stack
 from inspect3d.correlation.scene import Scene
+from inspect3d.correlation.still import stilled
 from inspect3d.outcome import MeasurementError
 from inspect3d.register.mobility import spread
 
@@ -231,6 +232,8 @@ def _step(
     factors = state.weights * found.clean
     system = system_of(scene, found, factors, noise, freedom, freedom.columns, scale, slides, level.stiffness)
     shape, cameras = system.solve(_nodal_equations(scene, found, noise, state, level)[1], camera_right)
+    if freedom.poses != "known" and level.blur == 0:  # the blurred pictures have shown where the surface lies
+        shape, cameras = stilled(scene, freedom, state.views, state.deviation, shape, cameras)
     by_cameras = (system.following @ system.camera_factor)[scene.whole]
     return shape, cameras, float(np.sqrt((by_cameras**2).sum() / max(len(by_cameras), 1)))
 

@@ -13,6 +13,7 @@ from inspect3d.arrays import Floats, Integers
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
 from inspect3d.correlation.linear import noise_of, slides_of, system_of
+from inspect3d.correlation.misfit import misfit, unresolved
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.system import System
@@ -37,32 +38,36 @@ class Systematic:
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """The covariance T (C + F F') T' of the smoothed deviation of the scene's nodes, in mm².
+    """The covariance T (C + F F') T' + diag(m²) of the smoothed deviation of the scene's nodes, in mm².
 
     Parameters
     ----------
     system : the information of the pictures and priors; its inverse is C
     shifts : F (n, r), the response of the shape to the systematic field
     smoother : T (n, n)
-    noise : variance of the residuals, grey levels²
+    rough : m (n,), of nodes where the elements do not fit, as at a step; 0 elsewhere
+    noise : variance of the residuals where they fit, grey levels²
     correlated : κ >= 1, by which the residuals of neighbouring points add up to more than if they were independent
     """
 
     system: System
     shifts: Floats
     smoother: sparse.csr_matrix
+    rough: Floats
     noise: float
     correlated: float
 
     @cached_property
     def variances(self) -> Floats:
         """Return the diagonal, (n,) mm²."""
-        return self.system.variances(self.smoother) + ((self.smoother @ self.shifts) ** 2).sum(axis=1)
+        by_shifts = ((self.smoother @ self.shifts) ** 2).sum(axis=1)
+        return self.system.variances(self.smoother) + by_shifts + self.rough**2
 
     def covariance(self, columns: Floats) -> Floats:
         """Return the covariance times columns (n, k)."""
         back = self.smoother.T @ columns
-        return self.smoother @ (self.system.covariance(back) + self.shifts @ (self.shifts.T @ back))
+        smooth = self.smoother @ (self.system.covariance(back) + self.shifts @ (self.shifts.T @ back))
+        return smooth + (self.rough**2)[:, None] * columns
 
     def variances_without(self, modes: Floats, solver: Floats) -> Floats:
         """Return the diagonal for the field less its modes, (I - J M) v: J = `modes` (n, k) and M = `solver` (k, n)."""
@@ -88,7 +93,8 @@ def uncertainty(
 
     The curvature H₀ = c A, with c the clean share of each facet's curvature A, is that of noiseless gradients; the
     estimate H₀⁻¹ J'W e has the covariance H₀⁻¹ A H₀⁻¹ = (c² A)⁻¹ for independent noise of the variance
-    v = sum w r² / (degrees of freedom), and κ times that for residuals that are not.
+    v = sum w r² / (degrees of freedom), and κ times that for residuals that are not. Where the elements do not fit, as
+    at a step, residuals count for neither; the nodes there have an uncertainty of their own; see `misfit`.
 
     Parameters
     ----------
@@ -101,39 +107,18 @@ def uncertainty(
     noise = noise_of(found, weights, len(scene.nodes) + freedom.unknowns)
     factors = weights * found.clean**2
     scale, slides = freedom.scale(views, scene.sample), slides_of(scene, freedom, views)
+    mixing, unknowns = freedom.spread(columns)[0], len(scene.nodes) + freedom.unknowns
     first = system_of(scene, found, factors, noise, freedom, columns, scale, slides)
-    correlated = _correlated(scene, found, weights / noise, first, freedom.spread(columns)[0])
-    system = first
-    if correlated > 1:
-        system = system_of(scene, found, factors, noise * correlated, freedom, columns, scale, slides)
+    summed = misfit(scene, found, weights / noise, first, mixing)
+    noise = noise_of(found, weights * summed.fitted, round(unknowns * summed.fitted.mean()))
+    total = noise * summed.correlated
+    system = system_of(scene, found, factors, total, freedom, columns, scale, slides)
     shifts = np.zeros((len(scene.nodes), 0))
     if systematic is not None:
-        shares = weights * found.clean / (noise * correlated)
-        shifts = _shifts(scene, found, shares, system, freedom.spread(columns)[0], columns, systematic)
-    return Uncertainty(system, shifts, scene.smoother(weights), noise, correlated)
-
-
-def _correlated(scene: Scene, found: Facets, weights: Floats, system: System, mixing: Floats) -> float:
-    """Return κ: the facets' scores J'W r squared, over what they would be for independent residuals.
-
-    That is the trace of K - K* C K*' with K (3, 3) the facet's normal matrix, K* its rows over all unknowns and C the
-    covariance of all unknowns: a fit follows its data.
-    """
-    trusted = (found.freedom > 0) & (weights >= 0.999 * weights.max())
-    corners = scene.triangles[trusted]
-    scale = weights[trusted, None, None]
-    scores = found.right[trusted] * scale[:, :, 0]
-    node, cross = found.node[trusted] * scale, found.cross[trusted] * scale @ mixing
-    solved, inverse = system.held
-    following, cameras = system.following[corners], system.camera_covariance
-    within = system.nodal.blocks(corners) - solved[corners] @ inverse @ solved[corners].transpose(0, 2, 1)
-    within += following @ cameras @ following.transpose(0, 2, 1)
-    between = -following @ cameras
-    explained = np.einsum("fij,fjk,fik->", node, within, node)
-    explained += 2 * np.einsum("fij,fjk,fik->", node, between, cross)
-    explained += np.einsum("fij,jk,fik->", cross, cameras, cross)
-    expected = np.einsum("fii->", node) - explained
-    return max(1.0, float((scores**2).sum() / expected))
+        shares = weights * found.clean / total
+        shifts = _shifts(scene, found, shares, system, mixing, columns, systematic)
+    rough = unresolved(scene, found, total, summed.fitted)
+    return Uncertainty(system, shifts, scene.smoother(weights), rough, noise, summed.correlated)
 
 
 def _shifts(

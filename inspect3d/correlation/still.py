@@ -1,0 +1,75 @@
+"""Keep the surface from sliding through the pictures while shape and cameras are solved for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from inspect3d.arrays import Floats, unit
+from inspect3d.camera import View
+from inspect3d.correlation.freedom import Freedom
+from inspect3d.correlation.linear import motions_of, moving_cameras
+from inspect3d.correlation.scene import SAMPLE, Scene
+from inspect3d.register.gauge import FREE
+
+SOFT = 0.1  # share of the stiffest motion's stiffness; a motion that moves the surface in itself mostly has less
+SMALL = 1e-3  # mm, or of a motion of the part
+
+
+def stilled(
+    scene: Scene, freedom: Freedom, views: Sequence[View], deviation: Floats, shape: Floats, cameras: Floats
+) -> tuple[Floats, Floats]:
+    """Return a step of shape (n,) and cameras (m,) with a motion of the part added under which its surface keeps still.
+
+    Moving the part, and growing it where the scale is not known, together with all cameras changes nothing that the
+    pictures show. The gauge of the system takes the motion that leaves the shape none of its own, and so lets what the
+    pictures show weakly slide the surface through them by many pixels: over noise that is another every time, and over
+    the outline of the part. Here the motions that move the surface in itself mostly are chosen such that its points
+    stay where they are in the mean of the pictures, as far as they can.
+    """
+    left, values, right = motions_of(scene, freedom)
+    soft = values**2 <= SOFT * values[0] ** 2
+    if not soft.any():
+        return shape, cameras
+    fields = -(left * values)[:, soft]
+    changes = moving_cameras(scene, freedom, views, right[soft])
+    some = slice(None, None, 1 + len(scene.nodes) // SAMPLE)
+    normals = scene.normals[some]
+    places = scene.nodes[some] + deviation[some, None] * normals
+    across = _tangents(normals)
+    here = [view.project(places) for view in views]
+    inverse = [
+        np.linalg.inv(np.stack([(view.project(places + SMALL * t) - at) / SMALL for t in across], axis=2))
+        for view, at in zip(views, here, strict=True)
+    ]
+
+    def slide(shape: Floats, cameras: Floats) -> Floats:
+        moved = places + shape[some, None] * normals
+        slides = [
+            np.einsum("nij,nj->ni", inverse[k], view.project(moved) - here[k])
+            for k, view in enumerate(freedom.moved(views, cameras))
+        ]
+        return np.mean(slides, axis=0).ravel()
+
+    columns = [slide(SMALL * u, SMALL * p) / SMALL for u, p in zip(fields.T, changes.T, strict=True)]
+    sizes = np.linalg.lstsq(np.stack(columns, axis=1), -slide(shape, cameras), rcond=None)[0]
+    return shape + fields @ sizes, cameras + changes @ sizes
+
+
+def in_gauge(
+    scene: Scene, freedom: Freedom, views: Sequence[View], deviation: Floats
+) -> tuple[tuple[View, ...], Floats]:
+    """Return cameras and deviation (n,) with the motion of the part that brings its shape into the system's gauge."""
+    left, values, right = motions_of(scene, freedom)
+    told = values**2 > FREE * values[0] ** 2
+    sizes = left[:, told].T @ deviation
+    changes = moving_cameras(scene, freedom, views, right[told]) @ (sizes / values[told])
+    return freedom.moved(views, changes), deviation - left[:, told] @ sizes
+
+
+def _tangents(normals: Floats) -> tuple[Floats, Floats]:
+    """Return two unit tangents (n, 3) of each normal, across each other."""
+    least = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = unit(np.cross(normals, least))
+    return first, np.cross(normals, first)
