@@ -1,6 +1,7 @@
 """From a recipe to the results on disk: the contract, the verdicts, the uncertainty, and what goes wrong."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -178,3 +179,13 @@ def test_a_folder_that_holds_something_else_is_not_replaced(tmp_path):
     with pytest.raises(InputError, match="not a folder of results"):
         run(recipe(tmp_path), out)
     assert (out / "thesis.txt").exists()
+
+
+def test_results_that_cannot_be_written_are_refused_before_anything_is_measured(tmp_path):
+    (tmp_path / "file").write_text("no folder", encoding="utf-8")
+    with pytest.raises(InputError, match=r"cannot be written: .*Choose another folder"):
+        run(recipe(tmp_path), tmp_path / "file" / "out")
+    if os.geteuid() != 0:  # root may write anywhere
+        (tmp_path / "locked").mkdir(mode=0o555)
+        with pytest.raises(InputError, match="Permission denied"):
+            run(recipe(tmp_path), tmp_path / "locked" / "out")
