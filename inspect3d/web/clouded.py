@@ -11,6 +11,7 @@ from inspect3d.arrays import Floats
 from inspect3d.measure import Measurement
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import InputError
+from inspect3d.pose import Pose
 from inspect3d.recipe import MeasurementTable, Recipe
 from inspect3d.register.landmarks import pose_from_landmarks
 from inspect3d.registry import build_for
@@ -93,8 +94,12 @@ class Clouded:
             "rms": fit.rms,
             "unit": "mm",
             "words": fit.words,
-            "measured_from_cad": fit.answer.inverse().matrix.tolist(),
+            **self.shown_at(fit.answer),
         }
+
+    def shown_at(self, cad_from_measured: Pose) -> dict[str, Any]:
+        """Return where a cloud that lies so has the CAD."""
+        return {"measured_from_cad": cad_from_measured.inverse().matrix.tolist()}
 
     def rows(self, pairs: Pairs) -> list[dict[str, Any]]:
         """Return the pairs as a recipe holds them."""

@@ -13,6 +13,7 @@ import numpy as np
 from inspect3d.inspection import nominal_of
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import InputError, Status
+from inspect3d.pose import Pose
 from inspect3d.recipe import MeasurementTable, Recipe, load_recipe
 from inspect3d.registry import method
 from inspect3d.report.colours import BACK
@@ -78,6 +79,7 @@ class Pick:
     def page(self) -> Page:
         """Return the page for the server."""
         get = {"jobs": self.about, "cad": self.cad, "picture": self.picture, "cloud": self.cloud, "snap": self.snap}
+        get["candidate"] = self.candidate
         post = {"fit": self.fit, "save": self.save, "choose": self.choose}
         return Page("pick", ASSETS, {**get, "alive": lambda _: Answer.json({})}, post)
 
@@ -140,6 +142,13 @@ class Pick:
         grey = source.photographs[request.index("picture", len(source.photographs))].grey
         found = snap(grey, request.number("x"), request.number("y"))
         return Answer.json(None if found is None else {"x": found.x, "y": found.y, "ellipse": found.ellipse})
+
+    def candidate(self, request: Request) -> Answer:
+        """Return where a candidate of an ambiguous start puts the CAD."""
+        job = self._job(request.query.get("job"))
+        chosen = job.candidates[request.index("candidate", len(job.candidates))]
+        with self._lock:
+            return Answer.json(job.source.shown_at(Pose.from_matrix(np.array(chosen["matrix"], dtype=np.float64))))
 
     def fit(self, request: Request) -> Answer:
         """Return what the pairs say."""
@@ -235,9 +244,7 @@ def _takes_landmarks(table: MeasurementTable) -> bool:
 
 
 def _job(recipe: Recipe, table: MeasurementTable, nominal: Nominal, out: Path) -> Job:
-    if table.listed("images"):
-        return Job(table, Pictured.of(recipe, table, nominal))
-    source = Clouded.of(recipe, table, nominal)
+    source = (Pictured if table.listed("images") else Clouded).of(recipe, table, nominal)
     if not (out / "results.json").is_file():
         return Job(table, source)
     ended = open_results(out).values["measurements"].get(table.name)

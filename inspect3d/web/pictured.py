@@ -11,7 +11,7 @@ import numpy as np
 from inspect3d.arrays import Floats
 from inspect3d.camera import View
 from inspect3d.correlation.outline import outline
-from inspect3d.correlation.picks import FEWEST, FEWEST_DLT, Picks
+from inspect3d.correlation.picks import FEWEST, FEWEST_DLT, Picks, ideal_camera
 from inspect3d.correlation.start import StereoStart
 from inspect3d.files.calibration import Rig
 from inspect3d.files.calibration_load import load_calibration
@@ -44,7 +44,7 @@ class Pictured:
     photographs : in the recipe's order
     rig : the calibration, or None
     focals : px, the recipe's rough focal lengths; None where it gives none
-    rig_from_cad : where the recipe puts the part in the frame of a rig
+    cad_from_measured : where the recipe puts the part before the rig or the first camera; None: unknown
     refine : whether its place there is refined
     """
 
@@ -52,7 +52,7 @@ class Pictured:
     photographs: tuple[Photograph, ...]
     rig: Rig | None
     focals: tuple[float | None, ...]
-    rig_from_cad: Pose
+    cad_from_measured: Pose | None
     refine: bool
 
     @classmethod
@@ -75,8 +75,8 @@ class Pictured:
         if len(focals) != count:
             raise InputError(f"`focal` has {len(focals)} values for {count} pictures: give one, or one for each.")
         matrix = table.alignment.matrix
-        rig_from_cad = Pose.identity() if matrix is None else Pose.from_matrix(np.array(matrix)).inverse()
-        return cls(nominal, photographs, rig, focals, rig_from_cad, table.alignment.refine)
+        place = None if matrix is None else Pose.from_matrix(np.array(matrix))
+        return cls(nominal, photographs, rig, focals, place, table.alignment.refine)
 
     def described(self) -> dict[str, Any]:
         """Return what the page needs to know."""
@@ -107,9 +107,25 @@ class Pictured:
             "rms": fit.rms,
             "unit": "px",
             "words": fit.words,
-            "outlines": [outline(self.nominal, view).round(2).reshape(-1).tolist() for view in fit.answer],
+            "outlines": [self._outline(view) for view in fit.answer],
             "seen": [view.project(pairs.cad).round(2).tolist() for view in fit.answer],
         }
+
+    def shown_at(self, cad_from_measured: Pose) -> dict[str, Any]:
+        """Return the outline in each picture of a part that lies so before the rig, or before the first camera.
+
+        The places of other cameras without a rig, and of a camera of unknown focal length, are not known: no outline.
+        """
+        measured_from_cad = cad_from_measured.inverse()
+        views: list[View | None] = [None] * len(self.photographs)
+        places = self.rig and (self.rig.camera_from_rig or self.rig.camera_from_cad)
+        if self.rig and places:
+            views = [View(c, p @ measured_from_cad) for c, p in zip(self.rig.cameras, places, strict=True)]
+        elif self.rig:
+            views[0] = View(self.rig.cameras[0], measured_from_cad)
+        elif focal := self.focals[0] or self.photographs[0].focal:
+            views[0] = View(ideal_camera(focal, self.photographs[0].size), measured_from_cad)
+        return {"outlines": [self._outline(view) if view else [] for view in views]}
 
     def rows(self, pairs: Pairs) -> list[dict[str, Any]]:
         """Return the pairs as a recipe holds them."""
@@ -146,6 +162,9 @@ class Pictured:
         more = max(FEWEST_DLT - len(points_cad), 1)
         return min(fits, key=lambda fit: fit.rms).saying(GUESSED.format(more=more, s="s" * (more > 1)))
 
+    def _outline(self, view: View) -> list[float]:
+        return outline(self.nominal, view).round(2).ravel().tolist()
+
     def _known_focals(self, count: int) -> tuple[float | None, ...] | None:
         """Return the focal lengths to begin with, None each where photographs or pairs tell; None for nothing."""
         told = all(f or p.focal for f, p in zip(self.focals, self.photographs, strict=True))
@@ -162,6 +181,5 @@ class Pictured:
         return standing_out(len(points_cad), FEWEST, placed, errors, FAIR)
 
     def _placed(self, points_cad: Floats, pixels: Floats, focals: Sequence[float | None]) -> tuple[View, ...]:
-        picks = Picks(points_cad, pixels) if len(points_cad) else None
-        start = StereoStart(picks, self.rig_from_cad.inverse(), self.refine)
+        start = StereoStart(Picks(points_cad, pixels), self.cad_from_measured, self.refine)
         return start(self.photographs, (None,) * len(self.photographs), self.rig, focals, self.nominal).views

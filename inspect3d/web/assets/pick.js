@@ -223,12 +223,11 @@ function showCandidates() {
   get("starts").replaceChildren(...job.candidates.map((candidate, k) => {
     const button = document.createElement("button");
     button.type = "button";
-    button.textContent = `${k + 1}: ${candidate.residual.toPrecision(3)} mm`;
+    button.textContent = candidate.residual === null ? `${k + 1}` : `${k + 1}: ${candidate.residual.toPrecision(3)} mm`;
     button.title = "click to start from this pose; rest on it to see it";
-    const shown = () => showOutline(inverse(candidate.matrix));
-    button.addEventListener("pointerenter", shown);
-    button.addEventListener("focus", shown);
-    button.addEventListener("pointerleave", () => showOutline(fitted && fitted.measured_from_cad));
+    button.addEventListener("pointerenter", () => showCandidate(k));
+    button.addEventListener("focus", () => showCandidate(k));
+    button.addEventListener("pointerleave", show);
     button.addEventListener("click", async () => {
       const answer = await trying(() => tell("choose", { job: job.name, candidate: k }));
       if (!answer) return;
@@ -238,9 +237,11 @@ function showCandidates() {
     return button;
   }));
 }
-function inverse(matrix) {
-  const turned = [0, 1, 2].map((k) => [matrix[0][k], matrix[1][k], matrix[2][k]]), t = [matrix[0][3], matrix[1][3], matrix[2][3]];
-  return turned.map((row) => [...row, -dot(row, t)]);
+async function showCandidate(k) {
+  const found = await trying(() => ask("candidate", { job: job.name, candidate: k }));
+  if (!found) return;
+  if (cloud) showOutline(found.measured_from_cad);
+  pictures.forEach((picture, which) => { picture.lines = found.outlines[which]; picture.draw(); });
 }
 
 /* ---- saving, keyboard ---- */
