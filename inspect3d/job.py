@@ -123,7 +123,9 @@ def _of_clouds(
         _judged(ended, found.deviation, found.alignments, table, recipe, nominal, measurement.scale_known),
         covariance=found.covariance,
         regions=Segmentation()(found.deviation, found.covariance, nominal.mesh),
-        features=features_of_points(recipe.part.features, nominal.mesh, found.points_cad, found.distance, found.noise),
+        features=features_of_points(
+            recipe.part.features, nominal.mesh, found.points_cad, found.distance, found.noise, found.alignments[0]
+        ),
         points_cad=found.points_cad,
         point_deviation=found.distance,
         noise=found.noise,
@@ -160,7 +162,9 @@ def _of_nodes(
         _judged(ended, found.deviation, (found.alignment,), table, recipe, nominal, measurement.scale_known),
         covariance=found.covariance,
         regions=Segmentation()(found.deviation, found.covariance, nominal.mesh),
-        features=features_of_nodes(recipe.part.features, nominal.mesh, found.deviation, found.covariance),
+        features=features_of_nodes(
+            recipe.part.features, nominal.mesh, found.deviation, found.covariance, found.alignment
+        ),
         views=found.views,
         residual=measurement.residual,
         hidden=measurement.hidden,

@@ -1,5 +1,7 @@
 """Steps, waviness and scallops in marked places: their height, how sure it is, and when nothing is resolved."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,8 +9,10 @@ from inspect3d.compare.features import features_of_nodes, features_of_points
 from inspect3d.compare.segmentation import Segmentation
 from inspect3d.deviate.deviation import Deviation
 from inspect3d.deviate.map_covariance import Independent, MapCovariance
+from inspect3d.pose import Pose
 from inspect3d.recipe_feature import Feature
 from inspect3d.recipe_types import Region
+from inspect3d.register.alignment import Alignment
 from inspect3d.virtual.deviation_field import Scallops, Step, Wave
 from tests.sheets import DEPTH, WIDTH, plane, plane_normals, sheet
 
@@ -19,6 +23,7 @@ WAVES = Feature(name="facets", kind="waviness", place=PLACE, across=(1.0, 0.0, 0
 SCALLOPS = Feature(name="scallops", kind="scallops", place=PLACE, across=(1.0, 0.0, 0.0), wavelength=4.0)
 FORM = Wave(0.02, (0.004, 0.007, 0.0), 0.3)
 SIGMA, NOISE = 0.004, 0.02
+HELD = Alignment(Pose.identity(), 1.0, 0.0, np.zeros((6, 6)), np.zeros(3), np.ones(3, bool))
 
 
 def of_points(feature, field, seed=0, noise=NOISE, count=20_000):
@@ -26,14 +31,14 @@ def of_points(feature, field, seed=0, noise=NOISE, count=20_000):
     random = np.random.default_rng(seed)
     points = np.column_stack([random.uniform(0, WIDTH, count), random.uniform(0, DEPTH, count), np.zeros(count)])
     values = field(points) + random.normal(0, noise, count)
-    return features_of_points((feature,), MESH, points, values, noise)[0]
+    return features_of_points((feature,), MESH, points, values, noise, HELD)[0]
 
 
 def of_nodes(feature, field, seed=0, sigma=SIGMA):
     """Return a feature as a noisy map shows it."""
     values = field(MESH.nodes) + np.random.default_rng(seed).normal(0, sigma, len(MESH))
     deviation, covariance = mapped(values, sigma)
-    return features_of_nodes((feature,), MESH, deviation, covariance)[0]
+    return features_of_nodes((feature,), MESH, deviation, covariance, HELD)[0]
 
 
 def mapped(values, sigma=SIGMA):
@@ -60,6 +65,27 @@ def test_a_feature_is_found_on_a_form_error_within_its_stated_uncertainty(measur
         z.append((found.value - height) / found.sigma)
     assert np.sqrt(np.mean(np.square(z))) < 1.5  # of 12: exceeded with a probability of 1 % if sigma is true
     assert np.sqrt(np.mean(np.square(z))) > 0.5
+
+
+def test_the_scallops_around_a_step_are_told_apart_from_it():
+    narrow = Region(box=((26.0, 5.0, -1.0), (39.0, 40.0, 1.0)))
+    field = Step(0.04, (30.0, 0.0, 0.0), (1.0, 0.0, 0.0)) + Scallops(0.012, 4.0, (1.0, 0.0, 0.0))
+    told = STEP.model_copy(update={"place": narrow, "wavelength": 4.0})
+    found = of_points(told, field)
+    assert found.value == pytest.approx(0.04, abs=3 * found.sigma)
+    assert abs(found.value - 0.04) < 0.5 * abs(
+        of_points(told.model_copy(update={"wavelength": None}), field).value - 0.04
+    )
+
+
+def test_lines_that_meet_a_wave_in_the_same_two_places_do_not_resolve_it():
+    random, field = np.random.default_rng(7), Scallops(0.012, 4.0, (1.0, 0.0, 0.0))
+    lines = np.repeat(np.arange(0.7, WIDTH, 2.0), 300)
+    points = np.column_stack([lines, random.uniform(0, DEPTH, len(lines)), np.zeros(len(lines))])
+    values = field(points) + random.normal(0, 0.005, len(points))
+    (found,) = features_of_points((SCALLOPS,), MESH, points, values, 0.005, HELD)
+    assert not found.resolved
+    assert "same places" in found.reason
 
 
 def test_the_sign_of_a_step_is_that_of_the_side_across():
@@ -89,9 +115,20 @@ def test_correlated_errors_make_a_step_less_sure():
     random = np.random.default_rng(4)
     patches = random.normal(0, 0.01, (60, 45))
     values = patches[MESH.nodes[:, 0].astype(int) // 9, MESH.nodes[:, 1].astype(int) // 9]
-    correlated = features_of_nodes((STEP,), MESH, *mapped(values))[0]
+    correlated = features_of_nodes((STEP,), MESH, *mapped(values), HELD)[0]
     independent = of_nodes(STEP, Wave(0.0, (0.0, 0.0, 0.0)), sigma=0.01)
     assert correlated.sigma > 2 * independent.sigma
+
+
+def test_a_step_on_an_edge_carries_the_uncertainty_of_the_pose():
+    folded = MESH.normals.copy()
+    folded[MESH.nodes[:, 0] > 30] = [0.6, 0.0, 0.8]
+    mesh, shifted = replace(MESH, normals=folded), replace(HELD, covariance=np.diag([0, 0, 0, 0.01**2, 0, 0]))
+    deviation, covariance = mapped(np.zeros(len(MESH)), 1e-5)
+    (flat,) = features_of_nodes((STEP,), MESH, deviation, covariance, shifted)
+    (edge,) = features_of_nodes((STEP,), mesh, deviation, covariance, shifted)
+    assert flat.sigma < 1e-4
+    assert edge.sigma == pytest.approx(0.6 * 0.01, rel=0.01)
 
 
 def test_where_nothing_was_measured_nothing_is_resolved():
@@ -103,7 +140,7 @@ def test_where_nothing_was_measured_nothing_is_resolved():
 
 @pytest.mark.parametrize(
     ("key", "value", "words"),
-    [("point", None, "point"), ("wavelength", 4.0, "a step has none"), ("across", (0.0, 0.0, 0.0), "not zero")],
+    [("point", None, "point"), ("kind", "waviness", "point"), ("across", (0.0, 0.0, 0.0), "not zero")],
 )
 def test_a_feature_that_lacks_what_it_needs_is_refused(key, value, words):
     table = {"name": "a", "kind": "step", "place": {"faces": (1,)}, "across": (1.0, 0.0, 0.0), "point": (0.0, 0.0, 0.0)}

@@ -23,43 +23,63 @@ def estimate(feature: Feature, readings: Readings) -> FeatureEstimate:
     """Return a feature as readings in its place show it.
 
     The deviation is fitted by a smooth trend of the second degree and the feature: a jump at the joint, or a wave of
-    the given length whose phase is free. The uncertainty is the larger of what the covariance of the readings says and
-    of a sandwich over blocks of the place, in which errors may correlate.
+    the given length, two harmonics, whose phase is free. The uncertainty is the larger of what the covariance of the
+    readings says and of a sandwich over blocks of the place, in which errors may correlate, and the pose comes on top.
+    The height is that in the alignment of the map: a step on an edge changes where the part is moved along its faces.
 
     Readings within their own reach of a joint mix both sides and are left out. The height of a waviness is twice the
     amplitude; that of scallops, arcs of a parabola between cusps, follows from their first harmonic, 4 h / pi².
     """
-    step = feature.kind == "step"
-    origin = (
-        np.array(feature.point) if feature.point else readings.places.mean(axis=0) if len(readings) else np.zeros(3)
-    )
     if len(readings) < 3:
         return _unresolved(feature, readings, "nothing was measured in the place marked")
+    origin = np.array(feature.point) if feature.point else readings.places.mean(axis=0)
     s, t = readings.along(np.array(feature.across), origin)
-    if step:
-        kept, columns = np.abs(s) > readings.reach, (s > 0).astype(float)[:, None]
-        if min(np.count_nonzero(kept & (s > 0)), np.count_nonzero(kept & (s < 0))) < LEAST:
-            return _unresolved(feature, readings, f"one side of the joint has fewer than {LEAST} readings")
+    waves = _waves(s, feature.wavelength) if feature.wavelength else np.zeros((len(s), 0))
+    if feature.kind == "step":
+        kept, columns, others = np.abs(s) > readings.reach, (s > 0).astype(float)[:, None], waves
+        doubt = _one_sided(s[kept])
+        if feature.wavelength and not doubt and _too_coarse(s, readings, feature.wavelength):
+            doubt = f"{_too_coarse(s, readings, feature.wavelength)} that of the waves around the joint"
     else:
-        length = float(feature.wavelength or np.inf)
-        if readings.spacing > length / READINGS:
-            need = (
-                f"its {readings.source} lie {readings.spacing:.2g} mm apart, and {length / READINGS:.2g} mm are needed"
-            )
-            return _unresolved(feature, readings, need)
-        if np.ptp(s) < length:
-            return _unresolved(feature, readings, "the place holds less than one wave")
-        turns = 2 * np.pi * s / length
-        kept, columns = np.ones(len(s), bool), np.column_stack([np.cos(turns), np.sin(turns)])
+        kept, columns, others = np.ones(len(s), bool), waves[:, :2], waves[:, 2:]
+        doubt = _too_coarse(s, readings, float(feature.wavelength or np.inf))
+    if doubt:
+        return _unresolved(feature, readings, doubt)
     size = max(np.abs(s).max(), np.abs(t).max())
     u, v = s / size, t / size
-    design = np.column_stack([columns, np.ones(len(u)), u, v, u * u, u * v, v * v])
+    design = np.column_stack([columns, others, np.ones(len(u)), u, v, u * u, u * v, v * v])
     kept = _without_outliers(design, readings.values, kept)
     if np.count_nonzero(kept) < design.shape[1] + LEAST:
         return _unresolved(feature, readings, "too few readings lie in the place marked")
     found, covariance = _solved(design, readings, kept, _blocks(u, v))
     wanted = columns.shape[1]
     return _told(feature, readings, found[:wanted], covariance[:wanted, :wanted], int(kept.sum()))
+
+
+def _waves(s: Floats, length: float) -> Floats:
+    """Return the first two harmonics (k, 4) of a wave along s (k,) mm."""
+    turns = 2 * np.pi * s / length
+    return np.column_stack([np.cos(turns), np.sin(turns), np.cos(2 * turns), np.sin(2 * turns)])
+
+
+def _one_sided(s: Floats) -> str:
+    """Return why readings do not show both sides of a joint, or nothing."""
+    if min(np.count_nonzero(s > 0), np.count_nonzero(s < 0)) < LEAST:
+        return f"one side of the joint has fewer than {LEAST} readings"
+    return ""
+
+
+def _too_coarse(s: Floats, readings: Readings, length: float) -> str:
+    """Return why readings do not show a wave of that length, or nothing."""
+    if readings.reach and readings.spacing > length / READINGS:
+        apart = f"its {readings.source} lie {readings.spacing:.2g} mm apart"
+        return f"{apart}, and {length / READINGS:.2g} mm are needed"
+    if np.ptp(s) < length:
+        return "the place holds less than one wave"
+    phase = np.sort(s / length % 1.0)
+    if np.diff(phase, append=phase[0] + 1.0).max() > 1 / READINGS:
+        return f"its {readings.source} meet every wave in the same places, too few to tell its height"
+    return ""
 
 
 def _told(feature: Feature, readings: Readings, found: Floats, covariance: Floats, count: int) -> FeatureEstimate:
@@ -105,7 +125,7 @@ def _blocks(u: Floats, v: Floats) -> np.ndarray:
 
 
 def _solved(design: Floats, readings: Readings, kept: Booleans, block: np.ndarray) -> tuple[Floats, Floats]:
-    """Return the unknowns and their covariance, the larger one of two in the wanted direction each.
+    """Return the unknowns and their covariance: the larger one of two, and that of the pose.
 
     Notes
     -----
@@ -120,4 +140,5 @@ def _solved(design: Floats, readings: Readings, kept: Booleans, block: np.ndarra
     sums = np.stack([np.bincount(block, row) for row in scores], axis=1)
     blocks = len(sums)
     shown = sums.T @ sums * blocks / max(blocks - 1, 1)
-    return found, shown if np.trace(shown[:1, :1]) > np.trace(stated[:1, :1]) else stated
+    pose = gain @ readings.pose
+    return found, (shown if shown[0, 0] > stated[0, 0] else stated) + pose @ pose.T

@@ -18,7 +18,8 @@ class Readings:
     ----------
     places : (k, 3) mm
     values : (k,) mm
-    covariance : of the values
+    covariance : of the values, but for the pose
+    pose : (k, p) mm, errors that the pose makes in all of them at once, a column for each independent one
     source : "points" or "nodes"
     spacing : mm, between neighbours
     reach : mm, over which a reading mixes what is around it; 0 for points
@@ -27,6 +28,7 @@ class Readings:
     places: Floats
     values: Floats
     covariance: FieldCovariance
+    pose: Floats
     source: str
     spacing: float
     reach: float
