@@ -6,6 +6,8 @@ import numpy as np
 from test_report import a_record, box_mesh, recipe
 
 from inspect3d.compare.compare import Compare
+from inspect3d.compare.deviation_region import DeviationRegion
+from inspect3d.compare.feature_estimate import FeatureEstimate
 from inspect3d.compare.measured_map import MeasuredMap
 from inspect3d.compare.sensitivity import OtherAlignment, Sensitivity
 from inspect3d.compare.tolerances import tolerances
@@ -40,6 +42,9 @@ def three_methods(edge: float = 2.5, **report: object) -> Record:
             motion = np.array([0, 0, 0, 0, 0, 0.03])
             other = OtherAlignment.of("the datums A, B and C", motion, np.zeros(3), mesh)
             part = replace(part, sensitivity=Sensitivity("a best fit", (other,), np.full(len(mesh), 0.001)))
+        step = FeatureEstimate("Kante", "step", 0.04, 0.003, 900, "nodes", 2.5, "" if k < 2 else "too coarse <here>")
+        region = DeviationRegion(node[:9], 12.5, np.array([5.0, 0, 5]), 0.15, 0.08, 0.002)
+        part = replace(part, features=(step,), regions=(region,) if k == 0 else ())
         parts.append(replace(part, verdict=verdict(deviation, limits, 0.95), residual=residual, points_cad=None))
         maps.append(MeasuredMap(parts[-1].name, deviation, covariance, {"ab": "left <1>.png"} if k else {}))
     nominal = Nominal(table.part.name, Surface(mesh.nodes, mesh.triangles), mesh, 0.003)

@@ -77,6 +77,17 @@ def test_what_another_alignment_would_change_is_shown(out):
     assert not (out / "pictures" / "wrong_alignment_1.png").exists()
 
 
+def test_it_is_told_which_method_resolved_which_feature_and_which_regions_stand_out(out):
+    html = (out / "report.html").read_text("utf-8")
+    (row,) = re.findall(
+        r'<tr><td class="name">Kante</td><td class="text">step</td>((?:<td class="number">.*?</td>){3})</tr>', html
+    )
+    assert re.findall(r">([^<]+)</td>", row) == ["+40.0 ± 6.0 µm", "+40.0 ± 6.0 µm", "not resolved (+40.0 ± 6.0 µm)"]
+    assert "too coarse &lt;here&gt;" in html
+    assert html.count("Regions that stand out") == 1
+    assert '<td class="text">5.0, 0.0, 5.0</td><td class="number">12.5</td><td class="number">+150.0</td>' in html
+
+
 def test_coverage_adds_up(out):
     html = (out / "report.html").read_text("utf-8")
     rows = dict(

@@ -32,6 +32,7 @@ from inspect3d.report.colours import BAND_COLOURS, UNMEASURED
 from inspect3d.report.digits import COVERAGE, decimals, grouped, measured, number, significant
 from inspect3d.report.pose_words import advice, alignment_rows, motions, poses
 from inspect3d.report.reading import Reading, readings
+from inspect3d.report.standing_out import standing_out
 from inspect3d.report.uncertainty import contributions
 from inspect3d.report.verdict_words import verdict_words
 
@@ -90,6 +91,7 @@ def account(
         *_shares(values["verdict"]),
         Tiles(tuple(figures.tiles(part))),
         *shown,
+        *standing_out(part),
         *_labels(readings(record.nominal.mesh, part, record.recipe.report.labels)),
         *_statistics(record, part, figures),
         *_poses(part),

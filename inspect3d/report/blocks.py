@@ -166,6 +166,11 @@ class Document:
     chapters: tuple[Chapter, ...]
 
 
+def numbers(count: int) -> list[Column]:
+    """Return the columns of so many figures."""
+    return ["number" for _ in range(count)]
+
+
 def table_of(pairs: Sequence[tuple[str, str]]) -> Table:
     """Return a table of labels and figures."""
     return Table((), tuple(pairs), ("text", "number"))

@@ -11,16 +11,16 @@ import numpy as np
 from inspect3d.arrays import Floats
 from inspect3d.compare.agreement_words import LOOSE
 from inspect3d.compare.comparison import Comparison
-from inspect3d.compare.deviation_region import DeviationRegion
 from inspect3d.record import Record
 from inspect3d.report.agreement_plot import draw_agreement
 from inspect3d.report.blocks import Block, Bullets, Cell, Chapter, Column, Heading, Link, Paragraph, Table, table_of
 from inspect3d.report.blocks import Picture as Shown
 from inspect3d.report.colours import ColourScale, deviation_scale, en_classes, en_scale, symmetric_limits
-from inspect3d.report.digits import grouped, measured, number, significant
+from inspect3d.report.digits import grouped, number
 from inspect3d.report.layout import Layout
 from inspect3d.report.matrix import draw_matrix
 from inspect3d.report.picture import Caption, Picture
+from inspect3d.report.standing_out import region_table, resolved
 from inspect3d.report.viewpoint import Viewpoint
 from inspect3d.report.views import Views
 
@@ -56,7 +56,7 @@ def draw_comparisons(record: Record, folder: Path, views: Views, layout: Layout)
     """
     if not record.comparisons:
         return None
-    blocks: list[Block] = [Paragraph(EXPLAINED), *_coverage(record)]
+    blocks: list[Block] = [Paragraph(EXPLAINED), *_coverage(record), *resolved(record.parts)]
     parts = [part for part in record.parts if part.status.has_map and part.deviation is not None]
     if len(parts) > 2:
         viewpoint = _seen(record, views, np.any([part.deviation.observed for part in parts if part.deviation], axis=0))[
@@ -71,7 +71,7 @@ def draw_comparisons(record: Record, folder: Path, views: Views, layout: Layout)
             Bullets(tuple(_typeset(words) for words in comparison.words)),
         ]
         if comparison.mean is not None:
-            blocks += [table_of(_figures(comparison)), *_regions(comparison)]
+            blocks += [table_of(_figures(comparison)), *region_table(comparison.regions or ())]
             blocks += _draw(record, comparison, k, folder, views, layout)
     return Chapter(ANCHOR, "Comparison of the methods", tuple(blocks))
 
@@ -121,21 +121,6 @@ def _figures(comparison: Comparison) -> list[tuple[str, str]]:
         ("E_n, root mean square", number(comparison.en_rms, 2)),
         ("nodes with E_n above 1", _percent(comparison.en_above_1)),
     ]
-
-
-def _regions(comparison: Comparison) -> list[Block]:
-    if not comparison.regions:
-        return []
-    head = ("Region at, mm", "Area, mm²", "Mean ± U (k = 2)", "Largest", "Probability by chance")
-    rows = tuple(_region(region) for region in comparison.regions)
-    return [Table(head, rows, ("text", "number", "number", "number", "number"))]
-
-
-def _region(region: DeviationRegion) -> tuple[Cell, ...]:
-    place = ", ".join(number(float(x), 1) for x in region.place)
-    mean = f"{_micro(region.mean)} µm" if region.sigma is None else measured(region.mean, region.sigma)
-    chance = "–" if region.p_value is None else significant(region.p_value, 2)
-    return (place, number(region.area, 1), mean, f"{_micro(region.height)} µm", chance)
 
 
 def _draw(record: Record, comparison: Comparison, k: int, folder: Path, views: Views, layout: Layout) -> list[Block]:

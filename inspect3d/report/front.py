@@ -19,6 +19,7 @@ from inspect3d.report.blocks import (
     Note,
     Paragraph,
     Table,
+    numbers,
 )
 from inspect3d.report.digits import measured, number
 from inspect3d.report.verdict_words import whole_verdict
@@ -43,7 +44,7 @@ def front(record: Record, accounts: Sequence[Account], agreement: Sequence[Block
     """
     verdict = whole_verdict(record)
     blocks: list[Block] = [Judgement(Badge(verdict.short, verdict.kind), verdict.words)]
-    columns: list[Column] = ["name", "text", "text", *_numbers(len(FIGURES))]
+    columns: list[Column] = ["name", "text", "text", *numbers(len(FIGURES))]
     head = ("Measurement", "Method", "Result", *FIGURES)
     blocks.append(Table(head, tuple(_row(each) for each in accounts), tuple(columns)))
     for each in accounts:
@@ -74,14 +75,10 @@ def _worst(record: Record) -> list[Block]:
     judged = any(part.verdict is not None for part in parts)
     names = (f"{part.name}, mm" for part in parts)
     head = ("Place (x, y, z), mm", "Found by", *(["Verdict"] if judged else []), *names)
-    columns: list[Column] = ["text", "name", *_numbers(len(parts))]
+    columns: list[Column] = ["text", "name", *numbers(len(parts))]
     if judged:
         columns.insert(2, "text")
     return [title, Table(head, tuple(_place(record, place, judged) for place in places), tuple(columns))]
-
-
-def _numbers(count: int) -> list[Column]:
-    return ["number" for _ in range(count)]
 
 
 def _place(record: Record, place: Place, judged: bool) -> tuple[Cell, ...]:
