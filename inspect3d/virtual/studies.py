@@ -7,16 +7,19 @@ First Results, Exp. Mech. 56, 2016.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 
+from inspect3d.virtual.camera_knowledge import rig_known
 from inspect3d.virtual.dataset import Dataset
 from inspect3d.virtual.deviation_field import Uniform
 from inspect3d.virtual.laser_scanner import LaserScanner
 from inspect3d.virtual.milled import machining, milled
+from inspect3d.virtual.picture_dataset import PictureDataset
 from inspect3d.virtual.random_pose import random_pose
-from inspect3d.virtual.stereo_datasets import MILLED_MIDDLE, photographed
+from inspect3d.virtual.stereo_datasets import AROUND, MILLED_MIDDLE, photographed
 from inspect3d.virtual.stereo_rig import StereoRig
 from inspect3d.virtual.study import Study
 
@@ -24,7 +27,7 @@ PAINT = 0.040  # mm, thickness in the paper
 SEEN_FROM = ((0.0, 0.0, 1.0), (0.4, 0.3, 1.0), (-0.4, -0.2, 1.0))
 
 MILLED_PART = """\
-# {title}
+# A milled block of the virtual rig by several methods; the truth is in the folders of scan and photographs.
 schema = 1
 
 [part]
@@ -42,14 +45,20 @@ files = ["{folder}scan.ply"]
 noise = 0.02                     # mm, standard noise of a point
 """
 
-STEREO = """
+PHOTOGRAPHS = """
 [[measurements]]
 name = "stereo"
-method = "stereocorrelation"
-images = ["{folder}view1.png", "{folder}view{opposite}.png"]
+method = "stereocorrelation"     # no landmarks: the start is found by itself
+images = ["{folder}view1.png", "{folder}view3.png"]
 cameras = "{folder}calibration.json"
 coating = {{ thickness = 0.040, sigma = 0.005 }}
-alignment = {{ start = "identity" }}
+
+[[measurements]]
+name = "photogrammetry"
+method = "colmap"
+images = [{images}]
+cameras = "{folder}calibration.json"
+coating = {{ thickness = 0.040, sigma = 0.005 }}
 """
 
 MILLED_REPORT = """
@@ -62,8 +71,7 @@ labels = [ { name = "mismatch", point = [55, 35, 29] } ]
 
 def milled_study(seed: int, rig: StereoRig | None = None) -> Study:
     """Return the paper's section 4: a milled block, scanned with a laser plane, then painted and photographed."""
-    rig = rig or StereoRig(cameras=8).halved()
-    deviation, opposite = machining(pitch=4.0), rig.cameras // 2 + 1
+    deviation = machining(pitch=4.0)
     scanner = LaserScanner(
         noise=0.02,
         views=SEEN_FROM,
@@ -72,18 +80,21 @@ def milled_study(seed: int, rig: StereoRig | None = None) -> Study:
         foreign=0.03,
         scan_from_cad=random_pose(np.random.default_rng(seed)),
     )
-    scan = Dataset(
-        milled(), deviation, scanner, MILLED_PART.format(title="The laser scan alone.") + LASER.format(folder="")
-    )
-    alone = MILLED_PART.format(title="The photographs alone.") + STEREO.format(folder="", opposite=opposite)
-    photographs = photographed(milled(), deviation + Uniform(PAINT), rig, MILLED_MIDDLE, seed, alone)
-    recipe = (
-        MILLED_PART.format(title="A milled block of the virtual rig by several methods; the truth is in the folders.")
-        + LASER.format(folder="scan/")
-        + STEREO.format(folder="photographs/", opposite=opposite)
-        + MILLED_REPORT
-    )
-    return Study(milled(), {"scan": scan, "photographs": photographs}, recipe)
+    painted, rig = deviation + Uniform(PAINT), rig or AROUND.halved()
+    alone = MILLED_PART + _photographs("", rig.cameras)
+    photographs = photographed(milled(), painted, rig, MILLED_MIDDLE, seed, alone)
+    datasets: dict[str, Dataset | PictureDataset] = {
+        "scan": Dataset(milled(), deviation, scanner, MILLED_PART + LASER.format(folder="")),
+        "photographs": replace(photographs, knowledge=rig_known),
+    }
+    tables = LASER.format(folder="scan/") + _photographs("photographs/", rig.cameras)
+    return Study(milled(), datasets, MILLED_PART + tables + MILLED_REPORT)
+
+
+def _photographs(folder: str, count: int) -> str:
+    """Return the tables of the methods that measure from photographs in a folder."""
+    images = ", ".join(f'"{folder}view{k}.png"' for k in range(1, count + 1))
+    return PHOTOGRAPHS.format(folder=folder, images=images)
 
 
 STUDIES: Mapping[str, Callable[[int], Study]] = MappingProxyType({"milled-study": milled_study})
