@@ -19,10 +19,11 @@ from inspect3d.correlation.shape import Shape
 from inspect3d.nominal.load import load_nominal
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.pose import Pose
+from inspect3d.virtual.deviation_field import DeviationField
 from inspect3d.virtual.milled import MilledSizes
 from inspect3d.virtual.picture_dataset import PictureDataset
 from inspect3d.virtual.scene import Scene
-from inspect3d.virtual.stereo_datasets import milled_stereo, smooth_stereo
+from inspect3d.virtual.stereo_datasets import milled_stereo, smooth_nurbs, smooth_stereo
 from inspect3d.virtual.stereo_rig import StereoRig
 from inspect3d.virtual.warp import Warp
 
@@ -76,13 +77,14 @@ class Setup:
 
     Parameters
     ----------
-    part : freeform or milled
+    part : freeform, smooth or milled
     cameras : how many
     full : 5 megapixels in place of a quarter of that
     element : mm
     noise : share of full scale
     tau, length : px and mm on the part, of a smooth systematic shift of each picture; tau 0: none
     scallop : mm, height of the scallops of the milled part; by default none, since coarse meshes do not resolve them
+    deviation : in place of the part's own
     """
 
     part: str = "freeform"
@@ -93,6 +95,7 @@ class Setup:
     tau: float = 0.0
     length: float = 25.0
     scallop: float = 0.0
+    deviation: DeviationField | None = None
 
     @property
     def rig(self) -> StereoRig:
@@ -102,8 +105,12 @@ class Setup:
 
     def dataset(self, seed: int) -> PictureDataset:
         """Return the part before its cameras."""
-        smooth = self.part == "freeform"
-        made = smooth_stereo(seed, self.rig) if smooth else milled_stereo(seed, self.rig, self.scallop)
+        made = {
+            "freeform": lambda: smooth_stereo(seed, self.rig),
+            "smooth": lambda: smooth_nurbs(seed, self.rig),
+            "milled": lambda: milled_stereo(seed, self.rig, self.scallop),
+        }[self.part]()
+        made = made if self.deviation is None else replace(made, deviation=self.deviation)
         if self.tau == 0.0:
             return made
         warps = [Warp(self.tau, self.length * self.rig.scale, 97 * seed + k) for k in range(len(made.cameras))]

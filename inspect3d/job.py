@@ -18,6 +18,7 @@ from inspect3d.deviate.deviation import Deviation
 from inspect3d.deviate.nodes import DeviateNodes
 from inspect3d.measure import Cloud, Measure, Measurement, NodalMeasurement
 from inspect3d.nominal.nominal import Nominal
+from inspect3d.nominal.nurbs import Nurbs
 from inspect3d.outcome import MeasurementError, Status
 from inspect3d.pose import Pose
 from inspect3d.progress import Progress
@@ -170,7 +171,16 @@ def _of_nodes(
         hidden=measurement.hidden,
         contributions=measurement.contributions,
         figures=measurement.figures,
+        surfaces=_aligned(measurement, found.alignment),
         remarks=remarks,
+    )
+
+
+def _aligned(measurement: NodalMeasurement, alignment: Alignment) -> tuple[Nurbs, ...]:
+    """Return the measured surfaces in the common alignment, as the instrument saw them, paint and warmth included."""
+    back = measurement.cad_from_measured.inverse()
+    return tuple(
+        surface.posed(back).posed(alignment.cad_from_measured, alignment.scale) for surface in measurement.surfaces
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from inspect3d.figure import Figure
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import InputError
 from inspect3d.pose import Pose
+
+if TYPE_CHECKING:
+    from inspect3d.nominal.nurbs import Nurbs
 
 
 @dataclass(frozen=True)
@@ -133,6 +136,7 @@ class NodalMeasurement:
     hidden : the motions that the data cannot tell, in words
     contributions : to the uncertainty: source, size with its unit, and how it enters
     figures : what the report shows of the way there
+    surfaces : the measured surfaces in the frame of `value`, of a method that moves such
     remarks : what the report must say, a sentence each
     """
 
@@ -149,6 +153,7 @@ class NodalMeasurement:
     hidden: tuple[str, ...] = ()
     contributions: tuple[tuple[str, str, str], ...] = ()
     figures: tuple[Figure, ...] = ()
+    surfaces: tuple[Nurbs, ...] = ()
     remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

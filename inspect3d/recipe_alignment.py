@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
 
 from inspect3d.recipe_types import Direction, Region, Row, Table, Vector
+
+if TYPE_CHECKING:
+    from inspect3d.pose import Pose
 
 
 class Landmark(Table):
@@ -63,6 +66,15 @@ class Start(Table):
         if any(region.tolerance for region in self.datum):
             raise ValueError("a datum has no tolerance")
         return self
+
+    @property
+    def place(self) -> Pose | None:
+        """Return the CAD from the frame of the measurement where the table states it, or None."""
+        from inspect3d.pose import Pose
+
+        if self.matrix is not None:
+            return Pose.from_matrix(np.array(self.matrix))
+        return Pose.identity() if self.start == "identity" else None
 
     @property
     def refined(self) -> bool:

@@ -20,6 +20,7 @@ from inspect3d.outcome import Status
 from inspect3d.register.alignment import Alignment, Candidate
 
 if TYPE_CHECKING:
+    from inspect3d.nominal.nurbs import Nurbs
     from inspect3d.recipe import Recipe
 
 
@@ -49,6 +50,7 @@ class MeasuredPart:
     hidden : the motions that the data cannot tell, in words
     contributions : of the method to the uncertainty: source, size with its unit, and how it enters
     figures : what the report shows of the way there
+    surfaces : the measured surfaces in the CAD frame, of a method that moves such
     remarks : what was done that the reader must know, a sentence each
     """
 
@@ -75,6 +77,7 @@ class MeasuredPart:
     hidden: tuple[str, ...] = ()
     contributions: tuple[tuple[str, str, str], ...] = ()
     figures: tuple[Figure, ...] = ()
+    surfaces: tuple[Nurbs, ...] = ()
     remarks: tuple[str, ...] = ()
 
 

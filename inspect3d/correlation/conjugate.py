@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
 
 from inspect3d.arrays import Floats
-from inspect3d.correlation.factor import Factor
+from inspect3d.correlation.space import Factored, Matrix
 
 ENOUGH = 1e-2
 MOST = 6
 
 
-def conjugate(matrix: sparse.csr_matrix, right: Floats, similar: Factor) -> Floats | None:
+def conjugate(matrix: Matrix, right: Floats, similar: Factored) -> Floats | None:
     """Return x with A x = b for b (n,), but for a hundredth of b; None if six steps do not lead there.
 
     Parameters

@@ -18,6 +18,7 @@ from inspect3d.correlation.picture import Interpolation, Pictures
 from inspect3d.correlation.scene import Scene, scene
 from inspect3d.correlation.shape import Shape
 from inspect3d.correlation.solver import COARSE, ON_NOMINAL, Level, Solver, State, Step, held
+from inspect3d.correlation.splines import Splines
 from inspect3d.correlation.still import in_gauge
 from inspect3d.correlation.texture import speckle_size
 from inspect3d.correlation.uncertainty import Systematic, needed_columns, uncertainty
@@ -56,6 +57,7 @@ class Correlate:
     poorest : least correlation coefficient of a facet that counts
     systematic : a smooth systematic shift of the pictures, carried into the uncertainty; where the pictures disagree by
         more than it explains, by as much as they do
+    splines : nodes move as the control points of the CAD's own NURBS faces have it; none: each by itself
     """
 
     levels: tuple[Level, ...] | None = None
@@ -66,6 +68,7 @@ class Correlate:
     steepest: float = 65.0
     poorest: float = 0.7
     systematic: Systematic | None = None
+    splines: Splines | None = None
 
     def __call__(
         self,
@@ -121,24 +124,25 @@ class Correlate:
             found = self._found(seen, pictures, state, last)
         systematic = self.systematic
         if systematic is not None:
-            floor = disagreement(seen, pictures.sharp, state.views, state.deviation)
+            floor = disagreement(seen, pictures.sharp, state.views, state.motion)
             systematic = replace(systematic, size=max(systematic.size, floor))
         sure = uncertainty(seen, found, state.views, state.weights, last, systematic)
-        local = float(np.sqrt(np.median(sure.system.nodal.inverse_diagonal)))
+        local = float(np.sqrt(np.median(sure.system.motion.quadratic(seen.space.rows(seen)))))
         motions = hidden_motions(seen, sure.system, last, local)
-        if last.poses != "known":
+        if last.poses != "known" and not seen.space.confined:
             found_views, deviation = in_gauge(seen, last, state.views, state.deviation)
-            state = replace(state, views=found_views, deviation=deviation)
+            state = replace(state, views=found_views, motion=deviation, deviation=deviation)
         return Shape(nominal.mesh, seen, state, sure, motions, found, calibrated, systematic)
 
     def _scene(self, nominal: Nominal, views: Sequence[View], masks: Sequence[Booleans | None] | None) -> Scene:
         masks = masks or [None] * len(views)
-        return scene(nominal, views, self.pixels, np.radians(self.steepest), masks, self.per_edge, self.lifted)
+        seen = scene(nominal, views, self.pixels, np.radians(self.steepest), masks, self.per_edge, self.lifted)
+        return seen if self.splines is None else self.splines(nominal, seen)
 
     def _found(self, seen: Scene, pictures: Pictures, state: State, freedom: Freedom) -> Facets:
         """Return what the pictures say about the facets in the end, as `uncertainty` needs it."""
         columns, whole = needed_columns(freedom, self.systematic), self.systematic is not None
-        return facets(seen, pictures.sharp, state.views, state.deviation, state.weights, columns, power=2, whole=whole)
+        return facets(seen, pictures.sharp, state.views, state.motion, state.weights, columns, power=2, whole=whole)
 
     def _good(self, seen: Scene, found: Facets) -> Booleans:
         """Tell which facets agree between the pictures, (f,).

@@ -18,7 +18,7 @@ STEP = 1e-3  # mm
 ENOUGH = 50  # pairs of facets
 
 
-def disagreement(scene: Scene, stack: Stack, views: Sequence[View], deviation: Floats) -> float:
+def disagreement(scene: Scene, stack: Stack, views: Sequence[View], motion: Floats) -> float:
     """Return the standard deviation (px) of a smooth shift of each picture that calibration and shape leave over.
 
     A node that moves along its normal moves a picture along epipolar lines only. What a facet's pictures are apart
@@ -29,7 +29,7 @@ def disagreement(scene: Scene, stack: Stack, views: Sequence[View], deviation: F
     Parameters
     ----------
     stack : the pictures without blur
-    deviation : (n,) mm, of the nodes of the scene
+    motion : (k,) unknowns of the scene's space
     """
     from scipy.spatial import cKDTree
 
@@ -40,7 +40,7 @@ def disagreement(scene: Scene, stack: Stack, views: Sequence[View], deviation: F
         shown = np.flatnonzero(scene.taking[:, pair].all(axis=1))
         if len(shown) < ENOUGH:
             continue
-        shift, variance = _shifts(scene, stack, [views[k] for k in pair], pair, deviation, shown)
+        shift, variance = _shifts(scene, stack, [views[k] for k in pair], pair, motion, shown)
         tree = cKDTree(centres[shown])
         some = np.linspace(0, len(shown) - 1, min(SAMPLE, len(shown))).astype(np.int64)
         for one, others in zip(some, tree.query_ball_point(centres[shown[some]], FAR * size), strict=True):
@@ -53,18 +53,19 @@ def disagreement(scene: Scene, stack: Stack, views: Sequence[View], deviation: F
 
 
 def _shifts(
-    scene: Scene, stack: Stack, views: Sequence[View], pair: tuple[int, ...], deviation: Floats, shown: Integers
+    scene: Scene, stack: Stack, views: Sequence[View], pair: tuple[int, ...], motion: Floats, shown: Integers
 ) -> tuple[Floats, Floats]:
     """Return how far two pictures are apart in each shown facet across the epipolar lines, px, and its variance.
 
     Both in pixels of the first view; the variance is up to a common factor.
     """
-    points, facet = scene.points, scene.points.facet
+    points, facet = scene.space.bent(scene, scene.points, motion), scene.points.facet
     number = np.full(len(scene.triangles), -1)
     number[shown] = np.arange(len(shown))
     chosen = np.flatnonzero(number[facet] >= 0)
     group, corners = number[facet[chosen]], scene.triangles[facet[chosen]]
     normals = unit(np.einsum("pi,pij->pj", points.shapes[chosen], scene.normals[corners]))
+    deviation = scene.space.rows(scene) @ motion
     lift = np.einsum("pi,pi->p", points.shapes[chosen], deviation[corners])
     places = points.places[chosen] + lift[:, None] * normals
     first_from_second, across = _local(scene, views, shown)

@@ -61,7 +61,7 @@ def hidden_motions(scene: Scene, system: System, freedom: Freedom, local: float)
     factor = system.camera_factor
     if not factor.size:
         return tuple(found)
-    response = system.following @ factor
+    response = scene.space.rows(scene) @ system.following @ factor
     _, sizes, mixes = np.linalg.svd(response[whole], full_matrices=False)
     sizes = sizes / np.sqrt(np.count_nonzero(whole))
     _, sigmas = freedom.spread(freedom.columns)
@@ -93,7 +93,7 @@ def _unseen(scene: Scene, system: System, freedom: Freedom) -> list[HiddenMotion
     words = [f"{motion.words}: the surface stays in itself" for motion in named(motions, scene.centre, length)]
     found = [HiddenMotion(w, flat, np.inf, 0.0) for w in words]
     apart_words = "a change of the cameras against each other that the pictures do not show"
-    for pattern in (system.following @ unseen[~as_one].T).T:
+    for pattern in (scene.space.rows(scene) @ system.following @ unseen[~as_one].T).T:
         size = np.sqrt((pattern**2).mean())
         found.append(HiddenMotion(apart_words, pattern / size if size > 0 else flat, np.inf, 0.0))
     return found

@@ -77,8 +77,8 @@ def _residual_map(
     shape: Shape, stack: Stack, views: Sequence[View], moved: bool, picture: NDArray[np.uint8], scale: float
 ) -> Floats:
     """Return the rms residual in each pixel of the reduced first picture, NaN where there is none."""
-    deviation = shape.state.deviation if moved else np.zeros(len(shape.scene.nodes))
-    pixels, residual = residuals(shape.scene, stack, views, deviation)
+    motion = shape.state.motion if moved else np.zeros(len(shape.state.motion))
+    pixels, residual = residuals(shape.scene, stack, views, motion)
     rows, columns = picture.shape
     there = np.isfinite(residual)
     at = np.floor((pixels[there] + 0.5) / scale).astype(np.int64)

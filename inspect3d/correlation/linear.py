@@ -15,8 +15,6 @@ from inspect3d.correlation.system import System
 from inspect3d.register.gauge import FREE
 from inspect3d.register.mobility import jacobian, spread
 
-SUPPORT = 1e-6
-RIDGE = 1e-9
 POOR = 3.0
 
 
@@ -79,22 +77,6 @@ def motions_of(scene: Scene, freedom: Freedom) -> tuple[Floats, Floats, Floats]:
     return left, values, right / units
 
 
-def stiffened(scene: Scene, values: Floats, stiffness: float) -> tuple[Floats, Floats]:
-    """Return a nodal matrix with a plate under it, and the plate, both in the scene's pattern.
-
-    Parameters
-    ----------
-    stiffness : of the plate, in medians of the diagonal. A millionth of that stays always, to carry nodes that show no
-        texture, and a billionth of a ridge
-    """
-    stiff_ones = values[scene.diagonal][values[scene.diagonal] > 0]
-    median = float(np.median(stiff_ones)) if len(stiff_ones) else 1.0
-    plate = stiffness * median * scene.plate
-    stiff = values + plate + SUPPORT * median * scene.plate
-    stiff[scene.diagonal] += RIDGE * median
-    return stiff, plate
-
-
 def system_of(
     scene: Scene,
     found: Facets,
@@ -115,11 +97,12 @@ def system_of(
     columns : camera parameters of each view in `found`
     scale : (m,) of each camera unknown, what moves the pictures by one pixel; see `Freedom.scale`
     slides : (m, s), see `slides_of`
-    stiffness : see `stiffened`
+    stiffness : see `inspect3d.correlation.space.plates`
     """
-    values, _ = stiffened(scene, scene.assembled(found.node * (factors / noise)[:, None, None]), stiffness)
-    nodal, gauge = scene.ordering.factor(values), gauge_of(scene, freedom)
+    space, weights = scene.space, (factors / noise)[:, None, None]
+    motion = space.factored(scene, space.matrix(scene, found.node * weights, stiffness)[0])
+    gauge = space.rows(scene).T @ gauge_of(scene, freedom)
     mixing, sigmas = freedom.spread(columns)
-    cross = scene.gathered(found.cross * (factors / noise)[:, None, None]) @ mixing
+    cross = space.gathered(scene, found.cross * weights) @ mixing
     camera = mixing.T @ found.camera @ mixing / noise
-    return System(nodal, cross, camera, gauge, 1 / sigmas**2, scale, slides, freedom.redundant)
+    return System(motion, cross, camera, gauge, 1 / sigmas**2, scale, slides, freedom.redundant)

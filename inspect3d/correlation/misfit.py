@@ -90,12 +90,12 @@ def _scores(scene: Scene, found: Facets, weights: Floats, system: System, mixing
     """
     squares, expected = np.zeros(len(weights)), np.zeros(len(weights))
     trusted = (found.freedom > 0) & (weights >= 0.999 * weights.max())
-    corners = scene.triangles[trusted]
-    scale = weights[trusted, None, None]
+    space, scale = scene.space, weights[trusted, None, None]
     node, cross = found.node[trusted] * scale, found.cross[trusted] * scale @ mixing
     solved, inverse = system.held
-    following, cameras = system.following[corners], system.camera_covariance
-    within = system.nodal.blocks(corners) - solved[corners] @ inverse @ solved[corners].transpose(0, 2, 1)
+    following, cameras = space.at_corners(scene, system.following)[trusted], system.camera_covariance
+    held = space.at_corners(scene, solved)[trusted]
+    within = space.blocks(scene, system.motion)[trusted] - held @ inverse @ held.transpose(0, 2, 1)
     within += following @ cameras @ following.transpose(0, 2, 1)
     between = -following @ cameras
     explained = np.einsum("fij,fjk,fik->f", node, within, node)

@@ -64,7 +64,7 @@ def facets(
     scene: Scene,
     stack: Stack,
     views: Sequence[View],
-    deviation: Floats,
+    motion: Floats,
     weights: Floats,
     columns: Integers,
     power: int = 1,
@@ -75,7 +75,7 @@ def facets(
 
     Parameters
     ----------
-    deviation : (n,) mm, of the nodes of the scene
+    motion : (k,) unknowns of the scene's space
     weights : (f,) in the sums over the cameras
     columns : camera parameters of each view to differentiate by
     power : how often the sums over the cameras take the clean share of the curvature: 0, the curvature as it is; 1,
@@ -93,7 +93,7 @@ def facets(
         np.stack([view.camera_from_cad.translation for view in views]),
         np.asarray(scene.centre),
     )
-    points = points or scene.points
+    points = scene.space.bent(scene, points or scene.points, motion)
     out = (
         np.empty((f, 3, 3)),
         np.empty((f, 3)),
@@ -108,7 +108,7 @@ def facets(
         rig,
         (points.places, points.shapes, points.starts, scene.triangles, scene.normals),
         scene.taking,
-        np.ascontiguousarray(deviation),
+        np.ascontiguousarray(scene.space.rows(scene) @ motion),
         weights,
         power,
         columns,

@@ -27,6 +27,42 @@ def interpolate(starts: Integers, shapes: Floats, corners: Integers, values: Flo
                 found[p, 0], found[p, 1], found[p, 2] = x / length, y / length, z / length
 
 
+@njit(cache=True)
+def cubic_monomials(s: float, t: float, u: float) -> tuple[float, ...]:
+    """Return the ten monomials of third degree in barycentric coordinates."""
+    return s * s * s, t * t * t, u * u * u, s * s * t, s * t * t, t * t * u, t * u * u, u * u * s, u * s * s, s * t * u
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def bend(
+    starts: Integers, shapes: Floats, corners: Integers, normals: Floats, cubics: Floats, places: Floats, found: Floats
+) -> None:
+    """Write the points (p, 3) of each facet, moved along the interpolated normals by a cubic.
+
+    Parameters
+    ----------
+    cubics : (f, 10) mm, the shares of `cubic_monomials`
+    places : (p, 3) mm, the points before
+    """
+    facets = len(corners)
+    for batch in prange((facets + BATCH - 1) // BATCH):
+        for f in range(batch * BATCH, min((batch + 1) * BATCH, facets)):
+            a, b, c = corners[f]
+            for p in range(starts[f], starts[f + 1]):
+                s, t, u = shapes[p, 0], shapes[p, 1], shapes[p, 2]
+                x = s * normals[a, 0] + t * normals[b, 0] + u * normals[c, 0]
+                y = s * normals[a, 1] + t * normals[b, 1] + u * normals[c, 1]
+                z = s * normals[a, 2] + t * normals[b, 2] + u * normals[c, 2]
+                monomials = cubic_monomials(s, t, u)
+                lift = 0.0
+                for m in range(10):
+                    lift += cubics[f, m] * monomials[m]
+                lift /= np.sqrt(x * x + y * y + z * z)
+                found[p, 0] = places[p, 0] + lift * x
+                found[p, 1] = places[p, 1] + lift * y
+                found[p, 2] = places[p, 2] + lift * z
+
+
 @njit(cache=True, parallel=True, error_model="numpy")
 def write_in_sight(
     places: Floats,

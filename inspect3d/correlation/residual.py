@@ -12,7 +12,7 @@ from inspect3d.correlation.picture import Stack
 from inspect3d.correlation.scene import Scene
 
 
-def residuals(scene: Scene, stack: Stack, views: Sequence[View], deviation: Floats) -> tuple[Floats, Floats]:
+def residuals(scene: Scene, stack: Stack, views: Sequence[View], motion: Floats) -> tuple[Floats, Floats]:
     """Return where the evaluation points appear in the first picture (p, 2) px, and their residuals (p,) grey levels.
 
     The grey levels of each facet are brought to the same mean and contrast in all pictures, as in the solver. The
@@ -21,10 +21,10 @@ def residuals(scene: Scene, stack: Stack, views: Sequence[View], deviation: Floa
 
     Parameters
     ----------
-    deviation : (n,) mm, of the nodes of the scene
+    motion : (k,) unknowns of the scene's space
     """
-    points, facet = scene.points, scene.points.facet
-    corners = scene.triangles[facet]
+    points, facet = scene.space.bent(scene, scene.points, motion), scene.points.facet
+    corners, deviation = scene.triangles[facet], scene.space.rows(scene) @ motion
     normals = unit(np.einsum("pi,pij->pj", points.shapes, scene.normals[corners]))
     places = points.places + np.einsum("pi,pi->p", points.shapes, deviation[corners])[:, None] * normals
     taken = scene.taking[facet]

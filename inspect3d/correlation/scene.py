@@ -13,6 +13,7 @@ from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.camera import View
 from inspect3d.correlation.evaluation import EvaluationPoints, evaluation_points, points_per_edge
 from inspect3d.correlation.factor import Ordering
+from inspect3d.correlation.space import EVERY_NODE, Space
 from inspect3d.correlation.visibility import visibility
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
@@ -35,6 +36,7 @@ class Scene:
     node : (n,) number of each node in the inspection mesh
     facet : (f,) number of each facet there
     share : (n,) how much of the evaluation points around a node counts
+    space : how the nodes may move
     """
 
     nodes: Floats
@@ -45,6 +47,7 @@ class Scene:
     node: Integers
     facet: Integers
     share: Floats
+    space: Space = EVERY_NODE
 
     @cached_property
     def centre(self) -> Floats:
@@ -176,6 +179,7 @@ class Scene:
             self.node[node],
             self.facet[kept],
             (self.share * after / before)[node],
+            self.space.restricted(node, kept),
         )
         return rest, node
 

@@ -12,12 +12,12 @@ from scipy import sparse
 from inspect3d.arrays import Floats
 from inspect3d.camera import View
 from inspect3d.correlation.conjugate import conjugate
-from inspect3d.correlation.factor import Factor
 from inspect3d.correlation.freedom import Freedom, Lens
-from inspect3d.correlation.linear import noise_of, robust, slides_of, stiffened, system_of
+from inspect3d.correlation.linear import noise_of, robust, slides_of, system_of
 from inspect3d.correlation.normal import Facets, facets
 from inspect3d.correlation.picture import Pictures, Stack
 from inspect3d.correlation.scene import Scene
+from inspect3d.correlation.space import Factored, Matrix
 from inspect3d.correlation.still import stilled
 from inspect3d.outcome import MeasurementError
 from inspect3d.register.mobility import spread
@@ -73,13 +73,15 @@ class State:
 
     Parameters
     ----------
-    deviation : (n,) mm, of the nodes of the scene
+    motion : (k,) unknowns of the scene's space
+    deviation : (n,) mm, by which they move the nodes of the scene
     views : the cameras
     weights : (f,) of the facets
     steps : how it came there
     settled : the last step was shorter than the tolerance
     """
 
+    motion: Floats
     deviation: Floats
     views: tuple[View, ...]
     weights: Floats
@@ -129,8 +131,9 @@ class Solver:
         MeasurementError
             The pictures say nothing about the part.
         """
-        deviation = np.zeros(len(scene.nodes)) if start is None else start
-        state = State(deviation, tuple(views), np.ones(len(scene.triangles)))
+        space = scene.space
+        motion = space.motion(scene, np.zeros(len(scene.nodes)) if start is None else start)
+        state = State(motion, space.rows(scene) @ motion, tuple(views), np.ones(len(scene.triangles)))
         stacks: dict[float, Stack] = {}
         for number, level in enumerate(self.levels):
             if level.blur not in stacks:
@@ -147,17 +150,18 @@ class Solver:
         points = scene.points.thinned(1 + int(1.5 * level.blur**2)) if level.blur >= 1 else scene.points
         final = number == len(self.levels) - 1
         tolerance = self.tolerance if final else max(self.tolerance, COARSE * max(1.0, level.blur))
-        last, factor = np.zeros(len(scene.nodes)), 1.0
-        nodal: Factor | None = None
+        last, factor = np.zeros(len(state.motion)), 1.0
+        rows = scene.space.rows(scene)
+        similar: Factored | None = None
         before: _Stride | None = None
         for count in range(level.steps):
-            found = facets(scene, stack, state.views, state.deviation, state.weights, freedom.columns, points=points)
+            found = facets(scene, stack, state.views, state.motion, state.weights, freedom.columns, points=points)
             if not np.isfinite(found.noise).any():
                 raise MeasurementError(
                     "The pictures show no grey levels that vary where the part should be: check that they are of this "
                     "part, exposed right, and that the cameras stand where they are said to."
                 )
-            noise = noise_of(found, state.weights, len(scene.nodes))
+            noise = noise_of(found, state.weights, len(state.motion))
             if before is not None and noise > WORSE * before.noise and factor > LEAST:
                 factor = max(factor * SHORTER, LEAST)
                 state = replace(before(freedom, factor), weights=before.state.weights)
@@ -167,9 +171,9 @@ class Solver:
                 shape, cameras, sure = _step(scene, found, noise, state, freedom, level)
             else:
                 cameras = np.zeros(0)
-                shape, nodal = _step_of_shape(scene, found, noise, state, level, nodal)
+                shape, similar = _step_of_shape(scene, found, noise, state, level, similar)
             change = max(
-                float(np.abs(shape).max()), _reach(scene, cameras, freedom) if level.moves in ON_NOMINAL else 0
+                float(np.abs(rows @ shape).max()), _reach(scene, cameras, freedom) if level.moves in ON_NOMINAL else 0
             )
             if count >= PATIENCE:
                 factor = max(factor * SHORTER, LEAST) if shape @ last < 0 else min(factor * LONGER, 1.0)
@@ -182,7 +186,7 @@ class Solver:
             step = Step(level, change, float(np.sqrt(noise)))
             told(step)
             weights = robust(found) if count < PATIENCE else state.weights
-            stride = _Stride(state, shape, cameras, noise)
+            stride = _Stride(state, rows, shape, cameras, noise)
             state = replace(
                 stride(freedom, factor),
                 weights=weights,
@@ -201,14 +205,16 @@ class _Stride:
     """A step from a state, and the variance of the residuals there."""
 
     state: State
+    rows: sparse.csr_matrix
     shape: Floats
     cameras: Floats
     noise: float
 
     def __call__(self, freedom: Freedom, factor: float) -> State:
         """Return the state after a share of the step."""
-        deviation = self.state.deviation + factor * self.shape
-        return replace(self.state, deviation=deviation, views=freedom.moved(self.state.views, factor * self.cameras))
+        motion = self.state.motion + factor * self.shape
+        views = freedom.moved(self.state.views, factor * self.cameras)
+        return replace(self.state, motion=motion, deviation=self.rows @ motion, views=views)
 
 
 def held(freedom: Freedom, poses: bool = True) -> Freedom:
@@ -228,38 +234,35 @@ def _step(
         matrix = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)
         firm = np.linalg.svd(slides / scale[:, None])[0][:, slides.shape[1] :] * scale[:, None]
         inverse = firm @ np.linalg.pinv(firm.T @ matrix @ firm, VAGUE, hermitian=True) @ firm.T
-        return np.zeros(len(scene.nodes)), inverse @ camera_right, 0.0
+        return np.zeros(len(state.motion)), inverse @ camera_right, 0.0
     factors = state.weights * found.clean
     system = system_of(scene, found, factors, noise, freedom, freedom.columns, scale, slides, level.stiffness)
-    shape, cameras = system.solve(_nodal_equations(scene, found, noise, state, level)[1], camera_right)
-    if freedom.poses != "known" and level.blur == 0:  # the blurred pictures have shown where the surface lies
+    shape, cameras = system.solve(_equations(scene, found, noise, state, level)[1], camera_right)
+    if freedom.poses != "known" and level.blur == 0 and not scene.space.confined:
+        # the blurred pictures have shown where the surface lies; motions of control points cannot follow every one
         shape, cameras = stilled(scene, freedom, state.views, state.deviation, shape, cameras)
-    by_cameras = (system.following @ system.camera_factor)[scene.whole]
+    by_cameras = (scene.space.rows(scene) @ system.following @ system.camera_factor)[scene.whole]
     return shape, cameras, float(np.sqrt((by_cameras**2).sum() / max(len(by_cameras), 1)))
 
 
 def _step_of_shape(
-    scene: Scene, found: Facets, noise: float, state: State, level: Level, nodal: Factor | None
-) -> tuple[Floats, Factor]:
+    scene: Scene, found: Facets, noise: float, state: State, level: Level, similar: Factored | None
+) -> tuple[Floats, Factored]:
     """Return the step with the cameras held, and a factor that may serve the next step as one of before may this."""
-    matrix, right = _nodal_equations(scene, found, noise, state, level)
-    shape = None if nodal is None else conjugate(matrix, right, nodal)
-    if nodal is None or shape is None:
-        nodal = scene.ordering.factor(matrix.data)
-        shape = nodal.solve(right)
-    return shape, nodal
+    matrix, right = _equations(scene, found, noise, state, level)
+    shape = None if similar is None else conjugate(matrix, right, similar)
+    if similar is None or shape is None:
+        similar = scene.space.factored(scene, matrix)
+        shape = similar.solve(right)
+    return shape, similar
 
 
-def _nodal_equations(
-    scene: Scene, found: Facets, noise: float, state: State, level: Level
-) -> tuple[sparse.csr_matrix, Floats]:
-    """Return matrix and right-hand side (n,) of the nodes, with the plate of the level."""
-    factors = state.weights * found.clean / noise
-    values, plate = stiffened(scene, scene.assembled(found.node * factors[:, None, None]), level.stiffness)
-    right = scene.gathered(found.right * (state.weights / noise)[:, None])
-    if level.stiffness > 0:
-        right -= scene.matrix(plate) @ state.deviation
-    return scene.matrix(values), right
+def _equations(scene: Scene, found: Facets, noise: float, state: State, level: Level) -> tuple[Matrix, Floats]:
+    """Return matrix and right-hand side (k,) of the shape, with the plate of the level."""
+    space, factors = scene.space, state.weights * found.clean / noise
+    matrix, plate = space.matrix(scene, found.node * factors[:, None, None], level.stiffness)
+    right = space.gathered(scene, found.right * (state.weights / noise)[:, None])
+    return matrix, right - plate @ state.motion if level.stiffness > 0 else right
 
 
 def _reach(scene: Scene, cameras: Floats, freedom: Freedom) -> float:

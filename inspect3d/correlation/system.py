@@ -1,4 +1,4 @@
-"""The linear system of shape and cameras: nodes eliminated first, the gauge by constraint."""
+"""The linear system of shape and cameras: the shape eliminated first, the gauge by constraint."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ import numpy as np
 from scipy import sparse
 
 from inspect3d.arrays import Floats
-from inspect3d.correlation.factor import Factor
+from inspect3d.correlation.space import Factored
 
 NOTHING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """K u + B p = b, B'u + (S + P) p = s, subject to C'u = 0.
+    """K q + B p = b, B'q + (S + P) p = s, subject to C'q = 0.
 
     With K̃ = K⁻¹ - K⁻¹C (C'K⁻¹C)⁻¹ C'K⁻¹ and X = K̃B, the pictures give the cameras the reduced matrix R = S - B'X,
     to which the priors add P. What both leave free, motions that no picture shows, is held.
 
     Parameters
     ----------
-    nodal : K factored, n nodes
+    motion : K factored, of n unknowns q of the shape: those of `inspect3d.correlation.space`
     cross : B (n, m), for m unknowns of the cameras, which may be none
     camera : S (m, m)
-    gauge : C (n, g), orthonormal columns, which may be none
+    gauge : C (n, g), independent columns, which may be none
     prior : (m,) the diagonal of P
     scale : (m,) the units of the unknowns p in which their stiffnesses compare
     slides : (m, s) changes of the cameras that no picture shows, held
     redundant : (m, r) changes of the cameras that others stand for, held
     """
 
-    nodal: Factor
+    motion: Factored
     cross: Floats
     camera: Floats
     gauge: Floats
@@ -45,13 +45,13 @@ class System:
     @cached_property
     def held(self) -> tuple[Floats, Floats]:
         """Return K⁻¹C (n, g) and (C'K⁻¹C)⁻¹ (g, g)."""
-        solved = self.nodal.solve(self.gauge)
+        solved = self.motion.solve(self.gauge)
         return solved, np.asarray(np.linalg.inv(self.gauge.T @ solved), dtype=np.float64)
 
     def constrained(self, right: Floats) -> Floats:
         """Return K̃ b for b (n,) or (n, k)."""
         solved, inverse = self.held
-        return self.nodal.solve(right) - solved @ (inverse @ (solved.T @ right))
+        return self.motion.solve(right) - solved @ (inverse @ (solved.T @ right))
 
     @cached_property
     def following(self) -> Floats:
@@ -108,16 +108,16 @@ class System:
         return self.camera_factor @ self.camera_factor.T
 
     def solve(self, right: Floats, camera_right: Floats) -> tuple[Floats, Floats]:
-        """Return the nodal motions u and camera unknowns p for right-hand sides b (n,) and s (m,), or more columns."""
+        """Return q and p for right-hand sides b (n,) and s (m,), or more columns."""
         cameras = self.camera_covariance @ (camera_right - self.following.T @ right)
         return self.constrained(right) - self.following @ cameras, cameras
 
     def variances(self, rows: sparse.csr_matrix) -> Floats:
-        """Return the diagonal of T C T' for the covariance C of the nodes, and T of neighbours' weights."""
+        """Return the diagonal of T C T' for the covariance C of the motions; each row of T is of a few neighbours."""
         solved, inverse = self.held
         held, following = rows @ solved, rows @ self.following
         by_cameras = np.einsum("ij,jk,ik->i", following, self.camera_covariance, following)
-        return self.nodal.quadratic(rows) - np.einsum("ij,jk,ik->i", held, inverse, held) + by_cameras
+        return self.motion.quadratic(rows) - np.einsum("ij,jk,ik->i", held, inverse, held) + by_cameras
 
     def covariance(self, columns: Floats) -> Floats:
         """Return C times columns (n, k)."""

@@ -12,6 +12,7 @@ from scipy import sparse
 from inspect3d.arrays import Floats, Integers
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
+from inspect3d.correlation.lack_of_fit import lack_of_fit
 from inspect3d.correlation.linear import noise_of, slides_of, system_of
 from inspect3d.correlation.misfit import misfit, unresolved
 from inspect3d.correlation.normal import Facets
@@ -43,9 +44,9 @@ class Uncertainty:
     Parameters
     ----------
     system : the information of the pictures and priors; its inverse is C
-    shifts : F (n, r), the response of the shape to the systematic field
-    smoother : T (n, n)
-    rough : m (n,), of nodes where the elements do not fit, as at a step; 0 elsewhere
+    shifts : F (k, r), the response of the shape to the systematic field
+    smoother : T (n, k), from the motions of the scene's space to the deviation of its nodes
+    rough : m (n,) mm, of nodes where the elements do not fit, as at a step, or splines miss the part; 0 elsewhere
     noise : variance of the residuals where they fit, grey levels²
     correlated : κ >= 1, by which the residuals of neighbouring points add up to more than if they were independent
     """
@@ -104,21 +105,29 @@ def uncertainty(
     systematic : the field to propagate; its response is that of the estimate to a shift of picture k, H₀⁻¹ J'W h_k
     """
     columns = needed_columns(freedom, systematic)
-    noise = noise_of(found, weights, len(scene.nodes) + freedom.unknowns)
+    rows, mixing = scene.space.rows(scene), freedom.spread(columns)[0]
+    noise = noise_of(found, weights, rows.shape[1] + freedom.unknowns)
     factors = weights * found.clean**2
     scale, slides = freedom.scale(views, scene.sample), slides_of(scene, freedom, views)
-    mixing, unknowns = freedom.spread(columns)[0], len(scene.nodes) + freedom.unknowns
-    first = system_of(scene, found, factors, noise, freedom, columns, scale, slides)
-    summed = misfit(scene, found, weights / noise, first, mixing)
-    noise = noise_of(found, weights * summed.fitted, round(unknowns * summed.fitted.mean()))
+    free, left, before = scene, found, noise
+    if scene.space.confined:
+        lack = lack_of_fit(scene, found, views, weights, freedom, columns)
+        free, left, before, first = lack.scene, lack.left, lack.noise, lack.system
+    else:
+        first = system_of(scene, found, factors, noise, freedom, columns, scale, slides)
+    summed = misfit(free, left, weights / before, first, mixing)
+    unknowns = len(scene.nodes) + freedom.unknowns
+    noise = noise_of(left, weights * summed.fitted, round(unknowns * summed.fitted.mean()))
     total = noise * summed.correlated
     system = system_of(scene, found, factors, total, freedom, columns, scale, slides)
-    shifts = np.zeros((len(scene.nodes), 0))
+    rough = unresolved(scene, left, total, summed.fitted)
+    if scene.space.confined:
+        rough = np.hypot(rough, lack.size(system, rows, total / before))
+    shifts = np.zeros((len(system.cross), 0))
     if systematic is not None:
         shares = weights * found.clean / total
         shifts = _shifts(scene, found, shares, system, mixing, columns, systematic)
-    rough = unresolved(scene, found, total, summed.fitted)
-    return Uncertainty(system, shifts, scene.smoother(weights), rough, noise, summed.correlated)
+    return Uncertainty(system, shifts, scene.space.smoother(scene, weights), rough, noise, summed.correlated)
 
 
 def _shifts(
@@ -138,9 +147,9 @@ def _shifts(
         for column in (SHIFT_X, SHIFT_Y):
             at = view * c + int(np.searchsorted(columns, column))
             weighted = shares[:, None] * fields
-            nodal = scene.gathered(found.cross[:, :, at, None] * weighted[:, None, :])
+            shape = scene.space.gathered(scene, found.cross[:, :, at, None] * weighted[:, None, :])
             cameras = mixing.T @ (found.whole[:, :, at].T @ weighted)
-            responses.append(system.solve(nodal, cameras)[0])
+            responses.append(system.solve(shape, cameras)[0])
     return np.concatenate(responses, axis=1)
 
 

@@ -6,6 +6,7 @@ from datetime import datetime
 from pathlib import Path
 
 from inspect3d.deviate.errors_file import write_errors
+from inspect3d.nominal.nurbs_face import write_step
 from inspect3d.progress import Progress
 from inspect3d.record import Record
 from inspect3d.report.comparisons import draw_comparisons
@@ -43,6 +44,8 @@ def write_report(
             continue
         map_polydata(record.nominal.mesh, part).save(folder / f"{part.name}.vtp")
         write_tables(record, part, folder)
+        if part.surfaces:
+            write_step(part.surfaces, folder / f"{part.name}.step")
         if part.covariance is not None:
             write_errors(folder / f"{part.name}_errors.npz", part.covariance, part.sources, record.nominal.mesh.face)
         if part.points_cad is not None and part.point_deviation is not None:

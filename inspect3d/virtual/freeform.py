@@ -1,4 +1,4 @@
-"""A smooth freeform part: one bicubic B-spline face, an open sheet as a camera sees it."""
+"""A smooth freeform part: one B-spline face, an open sheet as a camera sees it."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from inspect3d.arrays import Floats
 from inspect3d.virtual.part import Part
 from inspect3d.virtual.patch import Patch
 
-DEGREE = 3
-
 
 @dataclass(frozen=True)
 class FreeformSizes:
     """The sizes of the freeform part, mm: the sheet covers 0 to `length` in x and 0 to `width` in y, normals up.
 
-    `relief` is the height between its lowest and its highest point; `poles` counts control points along x and y.
+    `relief` is the height between its lowest and its highest point; `poles` counts control points along x and y, and
+    `degrees` are those of the B-spline along them.
     """
 
     length: float = 104.0
     width: float = 84.0
     relief: float = 9.0
     poles: tuple[int, int] = (10, 8)
+    degrees: tuple[int, int] = (3, 3)
 
 
 def freeform(sizes: FreeformSizes | None = None) -> Part:
@@ -36,8 +36,9 @@ def freeform(sizes: FreeformSizes | None = None) -> Part:
 def freeform_patch(sizes: FreeformSizes) -> Patch:
     """Return the sheet as a B-spline with (u, v) in the unit square; x and y are proportional to u and v."""
     across, along = sizes.poles
-    knots_u, knots_v = _knots(across), _knots(along)
-    u, v = np.meshgrid(_greville(knots_u, across), _greville(knots_v, along), indexing="ij")
+    p, q = sizes.degrees
+    knots_u, knots_v = _knots(across, p), _knots(along, q)
+    u, v = np.meshgrid(_greville(knots_u, p), _greville(knots_v, q), indexing="ij")
     x, y = sizes.length * u, sizes.width * v
     waves = np.sin(4.1 * u + 0.6) * np.cos(3.3 * v - 0.4) + 0.55 * np.sin(5.0 * v + 2.2 * u) + 0.5 * u * v
     height = waves + 0.8 * np.exp(-((u - 0.68) ** 2 + (v - 0.35) ** 2) / 0.05)
@@ -48,14 +49,14 @@ def freeform_patch(sizes: FreeformSizes) -> Patch:
     return Patch(np.stack([x, y, height, np.ones_like(x)], axis=-1), knots_u, knots_v)
 
 
-def _knots(count: int) -> Floats:
-    inner = np.linspace(0.0, 1.0, count - DEGREE + 1)
-    return np.concatenate([np.zeros(DEGREE), inner, np.ones(DEGREE)])
+def _knots(count: int, degree: int) -> Floats:
+    inner = np.linspace(0.0, 1.0, count - degree + 1)
+    return np.concatenate([np.zeros(degree), inner, np.ones(degree)])
 
 
-def _greville(knots: Floats, count: int) -> Floats:
+def _greville(knots: Floats, degree: int) -> Floats:
     """Return the parameters at which control points make the map linear."""
-    return np.array([knots[i + 1 : i + 1 + DEGREE].mean() for i in range(count)])
+    return np.array([knots[i + 1 : i + 1 + degree].mean() for i in range(len(knots) - degree - 1)])
 
 
 def _shape(sizes: FreeformSizes) -> Any:
@@ -80,5 +81,5 @@ def _shape(sizes: FreeformSizes) -> Any:
             counts.SetValue(k, int(count))
         arguments.append((values, counts))
     (values_u, counts_u), (values_v, counts_v) = arguments
-    surface = Geom_BSplineSurface(poles, values_u, values_v, counts_u, counts_v, DEGREE, DEGREE, False, False)
+    surface = Geom_BSplineSurface(poles, values_u, values_v, counts_u, counts_v, *sizes.degrees, False, False)
     return BRepBuilderAPI_MakeFace(surface, 1e-7).Face()

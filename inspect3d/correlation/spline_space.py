@@ -1,0 +1,140 @@
+"""Nodes that move as the control points of NURBS surfaces have it: u = B q."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from inspect3d.arrays import Booleans, Floats, Integers
+from inspect3d.correlation.dense import DenseFactor, cholesky
+from inspect3d.correlation.space import Factored, Matrix, plates
+
+if TYPE_CHECKING:
+    from inspect3d.correlation.evaluation import EvaluationPoints
+    from inspect3d.correlation.scene import Scene
+    from inspect3d.nominal.nurbs import Nurbs
+
+SAMPLES = 4
+"""Parts into which the edges of a facet are cut; the centres of what they cut it into are its sample points."""
+
+
+@dataclass(frozen=True, eq=False)
+class SplineSpace:
+    """Motions q (k,) mm of the control points along their normals.
+
+    Each facet follows the spline by a cubic, fitted to it at the sample points; for the derivatives by q, by the plane
+    that fits best there. The solution is that of the cubic: a residual that vanishes does so whatever it is multiplied
+    by.
+
+    Parameters
+    ----------
+    nodes : B (n, k)
+    samples : (16 f, k), the same at the sample points of every facet
+    patches : the nominal surfaces, their control points numbered one patch after the other
+    """
+
+    nodes: sparse.csr_matrix
+    samples: sparse.csr_matrix
+    patches: tuple[Nurbs, ...]
+
+    @property
+    def confined(self) -> bool:
+        """Return True."""
+        return True
+
+    def rows(self, scene: Scene) -> sparse.csr_matrix:
+        """Return B."""
+        return self.nodes
+
+    def motion(self, scene: Scene, deviation: Floats) -> Floats:
+        """Return the q that comes nearest to a deviation (n,) mm."""
+        return DenseFactor(cholesky((self.nodes.T @ self.nodes).toarray())).solve(self.nodes.T @ deviation)
+
+    def bent(self, scene: Scene, points: EvaluationPoints, motion: Floats) -> EvaluationPoints:
+        """Return the points moved along the normals from the facets to the cubics."""
+        from inspect3d.correlation.point_kernel import bend
+
+        flat = (self.nodes @ motion)[scene.triangles]
+        at_samples = (self.samples @ motion).reshape(len(flat), -1) - flat @ _shapes().T
+        found = np.empty_like(points.places)
+        cubics = at_samples @ np.linalg.pinv(_cubics()).T
+        bend(points.starts, points.shapes, scene.triangles, scene.normals, cubics, points.places, found)
+        return replace(points, places=found)
+
+    def gathered(self, scene: Scene, parts: Floats) -> Floats:
+        """Return what the corners give the control points."""
+        flat = parts.reshape(3 * len(parts), int(np.prod(parts.shape[2:])))
+        return (self._corners.T @ flat).reshape(self._corners.shape[1], *parts.shape[2:])
+
+    def at_corners(self, scene: Scene, motions: Floats) -> Floats:
+        """Return the corners of the planes that fit best."""
+        return (self._corners @ motions).reshape(len(scene.triangles), 3, *motions.shape[1:])
+
+    def matrix(self, scene: Scene, blocks: Floats, stiffness: float) -> tuple[Matrix, Matrix]:
+        """Return full matrices."""
+        f = len(blocks)
+        spread = sparse.bsr_matrix((blocks, np.arange(f), np.arange(f + 1)), shape=(3 * f, 3 * f))
+        plate, support = (
+            (self.nodes.T @ scene.matrix(values) @ self.nodes).toarray()
+            for values in plates(scene, scene.assembled(blocks), stiffness)
+        )
+        return (self._corners.T @ (spread @ self._corners)).toarray() + plate + support, plate
+
+    def factored(self, scene: Scene, matrix: Matrix) -> DenseFactor:
+        """Return the full factor."""
+        return DenseFactor(cholesky(np.array(matrix)))
+
+    def blocks(self, scene: Scene, factor: Factored) -> Floats:
+        """Return the covariance of the corners of the planes."""
+        assert isinstance(factor, DenseFactor)
+        spread = self._corners @ factor.inverse
+        found = np.empty((len(scene.triangles), 3, 3))
+        for i in range(3):
+            for j in range(3):
+                product = self._corners[i::3].multiply(spread[j::3])
+                found[:, i, j] = np.asarray(product.sum(axis=1)).ravel()
+        return found
+
+    def smoother(self, scene: Scene, weights: Floats) -> sparse.csr_matrix:
+        """Return B: cubics are not biased."""
+        return self.nodes
+
+    def surfaces(self, motion: Floats) -> tuple[Nurbs, ...]:
+        """Return the patches whose control points have moved; those that nobody sees have not."""
+        parts = np.split(motion, np.cumsum([patch.size for patch in self.patches])[:-1])
+        return tuple(
+            patch.moved(part[:, None] * patch.directions) for patch, part in zip(self.patches, parts, strict=True)
+        )
+
+    def restricted(self, node: Integers, kept: Booleans) -> SplineSpace:
+        """Return the space of all functions over some of the nodes and facets."""
+        return replace(self, nodes=self.nodes[node], samples=self.samples[np.repeat(kept, len(_shapes()))])
+
+    @cached_property
+    def _corners(self) -> sparse.csr_matrix:
+        """Return (3 f, k), the corners of the plane that fits each function best at the sample points of a facet."""
+        fit = sparse.csr_matrix(np.linalg.pinv(_shapes()))
+        facets = self.samples.shape[0] // len(_shapes())
+        return (sparse.kron(sparse.identity(facets), fit, format="csr") @ self.samples).tocsr()
+
+
+def sample_points() -> Floats:
+    """Return the barycentric coordinates (16, 3) of the sample points of a facet."""
+    return _shapes()
+
+
+def _shapes() -> Floats:
+    from inspect3d.correlation.evaluation import centres
+
+    return centres(SAMPLES)
+
+
+def _cubics() -> Floats:
+    """Return the ten cubic monomials in barycentric coordinates at the sample points, (16, 10)."""
+    from inspect3d.correlation.point_kernel import cubic_monomials
+
+    return np.array([cubic_monomials(*row) for row in _shapes().tolist()])
