@@ -18,7 +18,7 @@ from inspect3d.report.write import write_report
 
 @pytest.fixture(scope="module")
 def record():
-    return three_methods(formats=["html", "pdf"])
+    return three_methods()
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ from inspect3d.report.digits import decimals, measured, number, significant
 from inspect3d.report.flags import spread
 from inspect3d.report.scene import scene
 from inspect3d.report.uncertainty import pose_sigma
-from inspect3d.report.viewer import NOTHING, _quantised, sharp_edges
+from inspect3d.report.viewer import NOTHING, quantised, sharp_edges
 from inspect3d.report.viewpoint import Viewpoint, around
 from inspect3d.report.views import Views
 
@@ -184,8 +184,8 @@ def test_a_view_with_less_detail_shows_true_nodes_and_the_same_surface():
 
 def test_values_packed_into_two_bytes_keep_their_gaps_and_their_size():
     values = np.array([-0.5, np.nan, 0.123456, 0.5])
-    packed = _quantised(values)
+    packed = quantised(values)
     codes = np.frombuffer(base64.b64decode(packed["codes"]), "<u2")
     assert codes[1] == NOTHING
     assert packed["low"] + packed["step"] * codes[[0, 2, 3]] == pytest.approx(values[[0, 2, 3]], abs=1e-5)
-    assert np.frombuffer(base64.b64decode(_quantised(np.full(2, np.nan))["codes"]), "<u2").tolist() == [NOTHING] * 2
+    assert np.frombuffer(base64.b64decode(quantised(np.full(2, np.nan))["codes"]), "<u2").tolist() == [NOTHING] * 2

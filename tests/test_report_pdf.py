@@ -60,6 +60,10 @@ def test_every_name_is_text_on_paper(pages):
         assert "支架" in without_breaks
 
 
+def test_a_hash_can_be_copied_from_the_paper(pages):
+    assert "ab" * 32 in pages[-1][0]
+
+
 def test_page_and_paper_number_their_figures_alike(out, pages):
     html = (out / "report.html").read_text("utf-8")
     captions = re.findall(r"<figcaption>(Figure \d+)\. ([^<]*)</figcaption>", html)

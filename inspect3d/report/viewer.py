@@ -64,7 +64,7 @@ def viewer_data(record: Record, start: Viewpoint) -> str:
     data = {
         "centre": centre.tolist(),
         "start": start.direction.tolist(),
-        "nodes": [_quantised(column) for column in (mesh.nodes[detail.nodes] - centre).T],
+        "nodes": [quantised(column) for column in (mesh.nodes[detail.nodes] - centre).T],
         "triangles": _packed(detail.triangles, np.uint16),
         "edges": _packed(distinct(detail.place[sharp_edges(mesh)]), np.uint16),
         "normals": _packed(np.round(127 * mesh.normals[detail.nodes]), np.int8),
@@ -142,11 +142,11 @@ def _field(key: str, title: str, values: Floats, scale: ColourScale) -> dict[str
         "limits": list(scale.limits),
         "colours": scale.colours.tolist() if scale.classes else _packed(scale.colours, np.uint8),
         "classes": list(scale.classes),
-        "values": _quantised(values),
+        "values": quantised(values),
     }
 
 
-def _quantised(values: Floats) -> dict[str, Any]:
+def quantised(values: Floats) -> dict[str, Any]:
     """Return values (n,) as a lowest value, a step and whole numbers; NaN is the largest of these."""
     told = np.isfinite(values)
     low = float(values[told].min()) if told.any() else 0.0
