@@ -152,7 +152,7 @@ class Colmap:
         progress.update(0.8, "fitting patches")
         fit = FitPatches(self.half_window, self.spacing, steepest=self.steepest, systematic=self.systematic)
         grey = [source.photographs[k].grey for k in placed]
-        patched = fit(Pictures(grey), views, [source.masks[k] for k in placed], tied.points)
+        patched = fit(Pictures(grey), views, [source.masks[k] for k in placed], tied.points, tied.towards)
         return self._measurement(source, tied, placed, views, patched)
 
     def _features(self, photograph: Photograph, mask: Booleans | None) -> Features:

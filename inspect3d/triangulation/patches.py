@@ -18,6 +18,7 @@ CLOSE, TOO_CLOSE = 0.8, 0.7  # spacings; a new patch begins no closer to another
 WILD = 4.0  # usual uncertainties, and usual gaps to the neighbours' planes, beyond which a patch is left out
 OFF = 0.25  # px, gap to the planes of most neighbours that is always allowed
 MAD = 1.4826
+FACING = 0.5  # cosine between a first normal and the lines of sight, at the least
 ALONE = 2.5  # spacings within which a patch has two neighbours at the least
 
 
@@ -87,17 +88,23 @@ class FitPatches:
     rounds: int = 40
 
     def __call__(
-        self, pictures: Pictures, views: Sequence[View], masks: Sequence[Booleans | None], seeds: Floats
+        self,
+        pictures: Pictures,
+        views: Sequence[View],
+        masks: Sequence[Booleans | None],
+        seeds: Floats,
+        towards: Floats,
     ) -> Patched:
-        """Return the surface around seeds (n, 3), in the frame of the views.
+        """Return the surface around seeds, in the frame of the views.
 
         Parameters
         ----------
+        seeds, towards : (n, 3), points of the surface, and unit directions from them to the cameras that see them
         pictures : one of each view
         masks : of each view, True where its picture may be used, or None
         """
         stack = pictures.sharp
-        normals = _normals(seeds, views)
+        normals = _normals(seeds, towards)
         pitch = _pitch(seeds, views)
         kept = _spread_out(seeds, self.spacing * pitch)
         surface = self._fitted(stack, views, masks, seeds[kept], normals[kept])
@@ -189,14 +196,17 @@ def _shown(view: View, mask: Booleans | None, points: Floats) -> Booleans:
     return shown
 
 
-def _normals(points: Floats, views: Sequence[View]) -> Floats:
-    """Return the directions of least scatter around points (n, 3), towards the cameras, (n, 3)."""
+def _normals(points: Floats, towards: Floats) -> Floats:
+    """Return the directions of least scatter around points (n, 3), on the side of `towards` (n, 3), unit.
+
+    Where they are far from that, for the points around being too few or wild, it takes their place.
+    """
     _, near = cKDTree(points).query(points, min(NEIGHBOURS, len(points)))
     around = points[near]
     spread = around - np.median(around, axis=1, keepdims=True)
     normals = np.linalg.eigh(np.einsum("nki,nkj->nij", spread, spread))[1][:, :, 0]
-    towards = np.mean([view.centre for view in views], axis=0) - points
-    return normals * np.sign(np.einsum("ni,ni->n", normals, towards))[:, None]
+    side = np.einsum("ni,ni->n", normals, towards)[:, None]
+    return np.where(np.abs(side) > FACING, normals * np.sign(side), towards)
 
 
 def _spread_out(points: Floats, apart: Floats) -> Integers:

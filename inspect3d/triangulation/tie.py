@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inspect3d.arrays import Floats, Integers
+from inspect3d.arrays import Floats, Integers, unit
 from inspect3d.camera import Camera, View
 from inspect3d.outcome import MeasurementError
 from inspect3d.pose import Pose
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 SEED = 1
 LEAST_POINTS = 30
+FEWEST = 15  # known points that a photograph shows, to be placed
 NEAR_ENOUGH = 4.0  # px off the epipolar line, of a match that is looked at further
 
 
@@ -45,6 +46,14 @@ class TiePoints:
     view: Integers
     pixels: Floats
     error: float
+
+    @property
+    def towards(self) -> Floats:
+        """Return the mean direction from each point to the cameras that see it, (n, 3), unit."""
+        centres = np.array([np.zeros(3) if view is None else view.centre for view in self.views])
+        sights = unit(centres[self.view] - self.points[self.point])
+        sums = [np.bincount(self.point, sights[:, k], minlength=len(self.points)) for k in range(3)]
+        return unit(np.stack(sums, axis=1))
 
 
 @dataclass(frozen=True)
@@ -146,6 +155,7 @@ class Tie:
         options.triangulation.complete_max_reproj_error = options.triangulation.merge_max_reproj_error = self.error
         options.mapper.filter_max_reproj_error = self.error
         options.mapper.filter_min_tri_angle = self.angle
+        options.mapper.abs_pose_min_num_inliers = FEWEST
         options.mapper.abs_pose_refine_focal_length = not known
         options.mapper.abs_pose_refine_extra_params = not known
         return options
