@@ -156,8 +156,10 @@ class Pane {
     flag.append(tag);
     this.overlay.append(flag);
     this.pins.push(each);
+    text.textContent = this.pinWords(each);
     this.surface.draw();
   }
+  pinWords(each) { return (each.name ? `${each.name}: ` : "") + this.words(each.node, false); }
   unpin(node, name) {
     for (const each of this.pins) if (each.node === node && each.name === name) each.flag.remove();
     this.pins = this.pins.filter((each) => each.flag.isConnected);
@@ -170,7 +172,7 @@ class Pane {
       const k = each.node, [x, y] = this.surface.onScreen(this.surface.node(k));
       const facing = dot(near, [normals[3 * k], normals[3 * k + 1], normals[3 * k + 2]]) > 0;
       each.flag.hidden = !facing || this.surface.cutAway(this.surface.node(k)) || x < 0 || y < 0 || x > w || y > h;
-      each.text.textContent = (each.name ? `${each.name}: ` : "") + this.words(k, false);
+      each.text.textContent = this.pinWords(each);
       const beyond = 12 + each.tag.offsetWidth, flipped = x + beyond > w && x > w / 2 && beyond - x < x + beyond - w;
       each.flag.classList.toggle("flipped", flipped);
       each.flag.style.transform = `translate(${x}px, ${y}px)`;
