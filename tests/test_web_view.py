@@ -20,6 +20,7 @@ from inspect3d.deviate.map_covariance import Independent, MapCovariance
 from inspect3d.recipe import load_recipe
 from inspect3d.report.maps import map_polydata
 from inspect3d.report.results import as_json, results
+from inspect3d.web.notebook import Results
 from inspect3d.web.view_page import view_of
 from tests.browsing import browser, opened, serving
 from tests.test_report import NASTY, a_record
@@ -216,3 +217,29 @@ def test_ctrl_c_stops_the_server_cleanly_and_the_page_left_open_says_so(chromium
     page.wait_for_selector("#gone:not([hidden])")
     assert "The server has stopped" in page.text_content("#gone")
     page.close()
+
+
+def test_a_notebook_shows_the_live_view_without_a_server_and_a_picture_otherwise(chromium, tmp_path):
+    record = a_record()
+    part = record.parts[0]
+    node = np.flatnonzero(part.deviation.observed)
+    covariance = MapCovariance(node, Independent(np.full(len(node), 1e-4)), np.zeros((len(node), 0)))
+    (tmp_path / "results.json").write_text(as_json(results(record)), "utf-8")
+    map_polydata(record.nominal.mesh, part).save(tmp_path / "laser.vtp")
+    write_errors(tmp_path / "laser_errors.npz", covariance, {}, record.nominal.mesh.face)
+    shown = Results(tmp_path)
+    notebook = tmp_path / "notebook.html"
+    notebook.write_text(f"<!DOCTYPE html><body>{shown._repr_html_()}", "utf-8")
+    page = chromium.new_page()
+    asked = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(notebook.as_uri())
+    frame = page.frame_locator("iframe")
+    frame.locator(".field option").first.wait_for(state="attached")
+    frame.locator("canvas").first.hover()
+    frame.locator(".probe:not([hidden])").first.wait_for()
+    assert [url for url in asked if not url.startswith(("file:", "about:", "data:"))] == []
+    page.close()
+    picture = cv2.imdecode(np.frombuffer(shown._repr_png_(), np.uint8), cv2.IMREAD_COLOR)
+    assert picture.shape == (750, 1000, 3)
+    assert picture.std() > 10

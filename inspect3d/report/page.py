@@ -5,8 +5,13 @@ from __future__ import annotations
 import base64
 from importlib.resources import files
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from inspect3d.report.blocks import Document, as_data
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from markupsafe import Markup
 
 
 def page(document: Document, pictures: Path, viewer_data: str) -> str:
@@ -18,21 +23,36 @@ def page(document: Document, pictures: Path, viewer_data: str) -> str:
     pictures : the folder where its pictures lie
     viewer_data : of the 3-D view; empty where there is nothing to show
     """
+    environment = _environment()
+    environment.globals["embedded"] = lambda file: _embedded(pictures / file)
+    return environment.get_template("report.html.j2").render(document=as_data(document), **_viewer(viewer_data))
+
+
+def view_alone(title: str, viewer_data: str) -> str:
+    """Return a page that shows the 3-D view only."""
+    return _environment().get_template("alone.html.j2").render(title=title, **_viewer(viewer_data))
+
+
+def _environment() -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined
-    from markupsafe import Markup
 
     environment = Environment(loader=PackageLoader("inspect3d.report"), autoescape=True, undefined=StrictUndefined)
     environment.trim_blocks = environment.lstrip_blocks = True
-    environment.globals["embedded"] = lambda file: _embedded(pictures / file)
-    return environment.get_template("report.html.j2").render(
-        document=as_data(document),
-        pane_css=Markup(asset("pane.css")),
-        css=Markup(asset("report.css")),
-        surface_code=Markup(asset("surface.js")),
-        pane_code=Markup(asset("pane.js")),
-        viewer_code=Markup(asset("viewer.js")),
-        viewer_data=Markup(viewer_data),
-    )
+    return environment
+
+
+def _viewer(viewer_data: str) -> dict[str, Markup]:
+    """Return what the templates need for the 3-D view."""
+    from markupsafe import Markup
+
+    return {
+        "pane_css": Markup(asset("pane.css")),
+        "css": Markup(asset("report.css")),
+        "surface_code": Markup(asset("surface.js")),
+        "pane_code": Markup(asset("pane.js")),
+        "viewer_code": Markup(asset("viewer.js")),
+        "viewer_data": Markup(viewer_data),
+    }
 
 
 def asset(name: str) -> str:

@@ -8,7 +8,7 @@ from inspect3d.arrays import Floats, Integers
 
 ENOUGH = 200_000
 """Triangles that are drawn fluidly even without a graphics card; a mesh of fewer needs no coarse one."""
-WANTED = 60_000
+WANTED = 40_000
 """Triangles, about, of a coarse mesh."""
 
 

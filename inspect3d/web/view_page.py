@@ -107,21 +107,21 @@ class View:
         return Answer.json({"geometry": next(same, index), "fields": self._fields(index)})
 
     def geometry(self, request: Request) -> Answer:
-        """Return nodes about the common centre, triangles and normals of a map's mesh."""
+        """Return nodes about the common centre, triangles and normals of a mesh; fewer triangles for turning it."""
         mesh = self._map(request.index("map", len(self.shown))).mesh
         return Answer.arrays(
             nodes=(mesh.nodes - self._centre).astype(np.float32),
             triangles=mesh.triangles.astype(np.uint32),
             normals=np.round(127 * mesh.normals).astype(np.int8),
             crease=mesh.crease.astype(np.uint8),
+            coarse=coarse_triangles(mesh.nodes, mesh.triangles, mesh.normals).astype(np.uint32),
         )
 
     def lines(self, request: Request) -> Answer:
-        """Return the sharp edges of a map's mesh, and the triangles to draw while it turns."""
+        """Return the sharp edges of a map's mesh."""
         mesh = self._map(request.index("map", len(self.shown))).mesh
         edges = sides_of(mesh.nodes, mesh.triangles).sharp(SHARP)
-        coarse = coarse_triangles(mesh.nodes, mesh.triangles, mesh.normals)
-        return Answer.arrays(edges=edges.astype(np.uint32), coarse=coarse.astype(np.uint32))
+        return Answer.arrays(edges=edges.astype(np.uint32))
 
     def field(self, request: Request) -> Answer:
         """Return the values of a field at the nodes; NaN, or 0 for classes, where there is none."""

@@ -3,7 +3,9 @@
    `Eye` is where one looks from, and may be shared: panes with one eye turn together. `Surface` draws and reads a part.
    `steer` lets mouse, touch and keyboard move an eye. */
 
-const RESTING = 180; /* ms without a change, after which a large part is drawn in full again */
+const RESTING = 180; /* ms without a change, after which a part is drawn in full again */
+const LARGE = 200000; /* triangles from which smooth edges cost more than they show */
+const SLOW = 45; /* ms from picture to picture above which a part is drawn with half the pixels while it moves */
 
 function cross(a, b) { return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]; }
 function dot(a, b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -127,7 +129,10 @@ class Surface {
     this.plane = null; /* { normal, offset }: what lies beyond it is cut away */
     this.after = null; /* called after each picture */
     this.queued = false;
-    const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
+    this.swift = false;
+    this.pace = 0; /* ms from picture to picture while the eye moves, smoothed */
+    this.last = 0;
+    const gl = canvas.getContext("webgl2", { antialias: part.triangles.length < 3 * LARGE, preserveDrawingBuffer: true });
     this.gl = gl;
     if (!gl) return;
     this.program = gl.createProgram();
@@ -202,10 +207,19 @@ class Surface {
   draw() {
     if (!this.queued) { this.queued = true; requestAnimationFrame(() => this.painted()); }
   }
+  /* Return by how much to divide the pixels: a computer without a graphics card turns a coarser picture. */
+  sharpness() {
+    const now = performance.now(), gap = now - this.last;
+    this.last = now;
+    if (!this.eye.moving) return 1;
+    if (gap < 1000) this.pace = this.pace ? 0.7 * this.pace + 0.3 * gap : gap;
+    this.swift ||= this.pace > SLOW;
+    return this.swift ? 0.5 : 1;
+  }
   painted() {
     this.queued = false;
     const gl = this.gl, canvas = this.canvas, part = this.part, look = this.look, field = this.field;
-    const ratio = window.devicePixelRatio || 1, w = canvas.clientWidth, h = canvas.clientHeight;
+    const w = canvas.clientWidth, h = canvas.clientHeight, ratio = (window.devicePixelRatio || 1) * this.sharpness();
     if (!w || !h) return;
     if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) {
       canvas.width = Math.round(w * ratio);

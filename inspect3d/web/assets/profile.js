@@ -34,10 +34,11 @@ export function pointsOf(part, cut) {
   return points;
 }
 
-/* Return two directions in the plane: to the right and up, as one looks against its normal. */
+/* Return two directions in the plane, to the right and up: from the side from which x, or else y, points to the right. */
 function axesOf(normal) {
   const up = Math.abs(normal[2]) > 0.9 ? [0, 1, 0] : [0, 0, 1], right = unit(cross(up, normal));
-  return [right, cross(normal, right)];
+  const side = Math.sign(Math.abs(right[0]) > 0.3 ? right[0] : right[1]) || 1, facing = right.map((x) => side * x);
+  return [facing, unit(up.map((x, k) => x - dot(up, normal) * normal[k]))];
 }
 
 export class Profile {

@@ -43,7 +43,7 @@ async function load(k, place) {
   let part = views.find((view) => view.geometry === geometry)?.part;
   if (!part) {
     const none = new Uint32Array(0);
-    part = { centre: about.centre, edges: none, coarse: none, ...(await askArrays("geometry", { map: geometry })) };
+    part = { centre: about.centre, edges: none, ...(await askArrays("geometry", { map: geometry })) };
   }
   fields.forEach((field, index) => Object.assign(field, { index, map: k, fixed: field.limits.slice() }));
   eye ??= new Eye(part.nodes);
@@ -68,7 +68,8 @@ async function loadValues(field) {
   if (field.values) return;
   const { values } = await askArrays("field", { map: field.map, field: field.index });
   field.values = values;
-  field.shown = Uint8Array.from(values, (v) => (Number.isFinite(v) && !(field.classes.length && v === 0) ? 1 : 0));
+  field.shown = new Uint8Array(values.length);
+  for (let k = 0; k < values.length; k++) field.shown[k] = Number.isFinite(values[k]) && !(field.classes.length && values[k] === 0) ? 1 : 0;
 }
 
 /* ---- fields, limits and colours ---- */
