@@ -50,7 +50,7 @@ PIPELINE = (
 
 ASIDE = {
     "virtual": "deviate",
-    "web": "inspection",
+    "web": "comparing",
     "correlation": "deviate",
     "starting": "deviate",
     "triangulation": "deviate",
