@@ -75,7 +75,7 @@ def main() -> None:
     parser.add_argument("--full", action="store_true", help="5 megapixels in place of a quarter of that")
     parser.add_argument("--element", type=float, help="mm; default 4.6, full 2.7")
     parser.add_argument("--noise", type=float, default=0.01, help="share of full scale")
-    parser.add_argument("--pixels", type=float, default=8.0, help="px for each evaluation point")
+    parser.add_argument("--pixels", type=float, default=2.5, help="px for each evaluation point")
     parser.add_argument("--tau", type=float, default=0.0, help="px, size of a smooth systematic shift of the pictures")
     parser.add_argument("--length", type=float, default=25.0, help="mm over the part, of its correlation")
     parser.add_argument("--stated", action="store_true", help="state the shift to the engine")

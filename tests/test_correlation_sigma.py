@@ -112,6 +112,8 @@ def test_self_calibrated_the_rest_and_the_weak_motions_are_as_large_as_claimed(n
         views = tuple(believed(view, random) for view in exact[0])
         free = Freedom("free", (LENS,) * 2, views, nominal.mesh.nodes.mean(axis=0))
         shape = Correlate(pixels=4.0)(nominal, photographs(exact, random), views, free)
+        assert shape.settled
+        assert len(shape.state.steps) <= 15
         error = shape.values - bump(*shape.scene.nodes[:, :2].T)
         gauge = gauge_of(shape.scene, free)
         weak = np.stack([motion.pattern for motion in shape.hidden if np.isfinite(motion.sigma)], axis=1)
