@@ -27,6 +27,7 @@ ARGUMENTS = [
 ]
 DRIVER = "GL Driver Message"
 """Begins what Chromium's own driver says about speed when pictures are read back; the page has no part in it."""
+REFUSED = "the server responded with a status of 422"
 PATIENCE = 60_000  # ms
 
 
@@ -55,8 +56,11 @@ def browser() -> Iterator[Any]:
 
 
 @contextmanager
-def opened(chromium: Any, server: PageServer, size: tuple[int, int] = (1280, 720)) -> Iterator[Any]:
-    """Open the page of a server, wait until it shows everything, and see to it that it asked and complained nowhere."""
+def opened(chromium: Any, server: PageServer, size: tuple[int, int] = (1280, 720), refused: int = 0) -> Iterator[Any]:
+    """Open the page of a server, wait until it shows everything, and see to it that it asked and complained nowhere.
+
+    Chromium itself notes in the console when the server refuses a request in words: `refused` times.
+    """
     page = chromium.new_page(viewport={"width": size[0], "height": size[1]})
     page.set_default_timeout(PATIENCE)
     complaints: list[str] = []
@@ -67,7 +71,9 @@ def opened(chromium: Any, server: PageServer, size: tuple[int, int] = (1280, 720
     page.goto(server.address)
     page.wait_for_selector("body[data-ready=all]")
     yield page
-    assert [words for words in complaints if DRIVER not in words] == []
+    words = [each for each in complaints if DRIVER not in each]
+    assert [each for each in words if REFUSED not in each] == []
+    assert len(words) == refused
     assert {urlsplit(url).netloc for url in asked if not url.startswith(("data:", "blob:"))} == {
         f"127.0.0.1:{server.port}"
     }

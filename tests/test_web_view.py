@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import subprocess
 import sys
@@ -180,6 +181,17 @@ def test_flags_are_set_by_mouse_and_keyboard_named_and_saved_in_the_recipe(page,
     assert [label.name for label in labels] == ["<b>bump</b>", "P2"]
     assert recipe.read_text("utf-8").startswith(RECIPE)
     assert set(tomllib.loads(recipe.read_text("utf-8"))["report"]) == {"labels"}
+
+
+def test_where_two_maps_share_a_file_the_page_says_why_there_is_no_en_and_shows_none(chromium, out, tmp_path):
+    shutil.copytree(out, tmp_path / "out")
+    shutil.copy(out / "laser_errors.npz", tmp_path / "out" / "stereo_errors.npz")
+    with serving(view_of([tmp_path / "out"], None).page) as server, opened(chromium, server, refused=1) as page:
+        page.select_option("#field", "en")
+        page.wait_for_selector("text=stereo and laser were measured from the same laser.ply")
+        shown = picture_of(page, 1)
+        grey = np.abs(shown - shown.mean(axis=2, keepdims=True)).max(axis=2) < 15
+        assert grey.mean() > 0.97
 
 
 def test_limits_and_colours_are_chosen_and_a_picture_is_kept(page, tmp_path):

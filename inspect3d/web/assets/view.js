@@ -106,15 +106,21 @@ function coloursOf(field, [low, high]) {
   }
   return colours;
 }
+/* Show a map without any colour: it has no such field. */
+function blank(view) {
+  const count = view.part.nodes.length / 3;
+  view.pane.field = null;
+  view.pane.surface.show({ values: new Float32Array(count), shown: new Uint8Array(count), limits: [0, 1], classes: [], colours: new Uint8Array(768) });
+}
 async function show(view) {
   const field = view.fields.find((each) => each.key === fieldKey);
-  if (!field) {
-    const count = view.part.nodes.length / 3;
-    view.pane.field = null;
-    view.pane.surface.show({ values: new Float32Array(count), shown: new Uint8Array(count), limits: [0, 1], classes: [], colours: new Uint8Array(768) });
-    return;
+  if (!field) { blank(view); return; }
+  try {
+    await loadValues(field);
+  } catch (error) {
+    blank(view);
+    throw error;
   }
-  await loadValues(field);
   field.limits = field.classes.length ? field.limits : limitsOf(field.key);
   if (!field.classes.length) field.colours = coloursOf(field, field.limits);
   view.pane.show(field);
