@@ -17,6 +17,8 @@ from inspect3d.outcome import InputError
 STEP_SUFFIXES = frozenset({".step", ".stp"})
 IGES_SUFFIXES = frozenset({".iges", ".igs"})
 _GEOMETRY = ("StepGeom_", "StepShape_")
+_SECONDS, _SECONDS_PER_BYTE = 20, 1e-5
+"""Files of real parts take 2.5e-7 s of processor time a byte."""
 
 
 def read_brep(path: Path) -> Brep:
@@ -118,8 +120,8 @@ def _transferred(path: Path, is_step: bool) -> Any:
             if BinTools.Write_s(_translated(path, is_step), f"{handed}.part"):
                 Path(f"{handed}.part").rename(handed)
 
-        if not survived(hand_over):
-            raise InputError(f"{path.name} is damaged: OpenCASCADE crashes when it reads it; export it again.")
+        if not survived(hand_over, _SECONDS + int(path.stat().st_size * _SECONDS_PER_BYTE)):
+            raise InputError(f"{path.name} is damaged: OpenCASCADE crashes or hangs on it; export it again.")
         if not handed.exists():
             return _translated(path, is_step)  # which says what is wrong
         shape = TopoDS_Shape()

@@ -1,4 +1,4 @@
-"""Work that may crash, done first by a child process."""
+"""Work that may crash or never end, done first by a child process."""
 
 from __future__ import annotations
 
@@ -10,11 +10,15 @@ import warnings
 from collections.abc import Callable
 
 
-def survived(work: Callable[[], object]) -> bool:
+def survived(work: Callable[[], object], seconds: int) -> bool:
     """Do some work in a child process and tell whether that lived to its end, be it by an exception.
 
     The child is a copy of this process, which is there in an instant, where a new one would need a second for its
     imports. It has none of the other threads and must not wait for one; what it prints is lost.
+
+    Parameters
+    ----------
+    seconds : of processor time, after which the child is ended
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # Python's, that a copy misses the other threads
@@ -22,6 +26,7 @@ def survived(work: Callable[[], object]) -> bool:
     if not child:
         try:
             _hush()
+            resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
             work()
         finally:
             os._exit(0)
