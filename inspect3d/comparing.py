@@ -75,8 +75,9 @@ def joined(folders: Sequence[Path]) -> Record:
     names = _names(finished)
     runs = [_run(each, own) for each, own in zip(finished, names, strict=True)]
     meshes = [(run, run.mesh) for run in runs if run.mesh is not None]
-    if not meshes:
-        raise InputError("None of these inspections has a map, so there is nothing to compare.")
+    count = sum(part.deviation is not None for run in runs for part in run.parts)
+    if count < 2:
+        raise InputError(f"These inspections hold {count} map{'' if count == 1 else 's'}: a comparison needs two.")
     first, mesh = meshes[0]
     for run, other in meshes[1:]:
         _require_same(first.finished.folder, mesh, run.finished.folder, other)

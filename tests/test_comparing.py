@@ -106,6 +106,11 @@ def test_runs_on_different_meshes_are_refused_with_the_reason(runs):
     assert not (folder / "never").exists()
 
 
+def test_one_map_is_nothing_to_compare(runs):
+    with pytest.raises(InputError, match="hold 1 map: a comparison needs two"):
+        joined([runs[0] / "only-a"])
+
+
 def test_a_folder_without_an_inspection_is_refused(tmp_path):
     with pytest.raises(InputError, match="holds no inspection"):
         compare_runs([tmp_path], tmp_path / "out")

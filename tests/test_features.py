@@ -78,6 +78,12 @@ def test_the_scallops_around_a_step_are_told_apart_from_it():
     )
 
 
+def test_nodes_too_coarse_for_the_scallops_still_tell_the_step():
+    field = FORM + Step(0.04, (30.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    found = of_nodes(STEP.model_copy(update={"wavelength": 4.0}), field)
+    assert found.value == pytest.approx(0.04, abs=3 * found.sigma)
+
+
 def test_lines_that_meet_a_wave_in_the_same_two_places_do_not_resolve_it():
     random, field = np.random.default_rng(7), Scallops(0.012, 4.0, (1.0, 0.0, 0.0))
     lines = np.repeat(np.arange(0.7, WIDTH, 2.0), 300)

@@ -39,7 +39,9 @@ def estimate(feature: Feature, readings: Readings) -> FeatureEstimate:
         kept, columns, others = np.abs(s) > readings.reach, (s > 0).astype(float)[:, None], waves
         doubt = _one_sided(s[kept])
         if feature.wavelength and not doubt and _too_coarse(s, readings, feature.wavelength):
-            doubt = f"{_too_coarse(s, readings, feature.wavelength)} that of the waves around the joint"
+            if not readings.reach:  # nodes average waves that short; points that meet them alike take them for the step
+                return _unresolved(feature, readings, "its points do not tell the waves around the joint from the step")
+            others = waves[:, :0]
     else:
         kept, columns, others = np.ones(len(s), bool), waves[:, :2], waves[:, 2:]
         doubt = _too_coarse(s, readings, float(feature.wavelength or np.inf))
