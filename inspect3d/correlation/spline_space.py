@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from inspect3d.correlation.scene import Scene
     from inspect3d.nominal.nurbs import Nurbs
 
+FILLED = 0.05  # share of entries that are not zero
 SAMPLES = 4
 """Parts into which the edges of a facet are cut; the centres of what they cut it into are its sample points."""
 
@@ -79,10 +80,10 @@ class SplineSpace:
         f = len(blocks)
         spread = sparse.bsr_matrix((blocks, np.arange(f), np.arange(f + 1)), shape=(3 * f, 3 * f))
         plate, support = (
-            (self.nodes.T @ scene.matrix(values) @ self.nodes).toarray()
+            _congruent(scene.matrix(values), self._packed[0])
             for values in plates(scene, scene.assembled(blocks), stiffness)
         )
-        return (self._corners.T @ (spread @ self._corners)).toarray() + plate + support, plate
+        return _congruent(spread, self._packed[1]) + plate + support, plate
 
     def factored(self, scene: Scene, matrix: Matrix) -> DenseFactor:
         """Return the full factor."""
@@ -120,6 +121,20 @@ class SplineSpace:
         fit = sparse.csr_matrix(np.linalg.pinv(_shapes()))
         facets = self.samples.shape[0] // len(_shapes())
         return (sparse.kron(sparse.identity(facets), fit, format="csr") @ self.samples).tocsr()
+
+    @cached_property
+    def _packed(self) -> tuple[Matrix, Matrix]:
+        """Return B and the corners of the planes, in full where that is quicker to multiply."""
+        nodes, corners = (
+            rows.toarray() if rows.nnz > FILLED * np.prod(rows.shape) else rows for rows in (self.nodes, self._corners)
+        )
+        return nodes, corners
+
+
+def _congruent(matrix: sparse.csr_matrix, rows: Matrix) -> Floats:
+    """Return R'MR in full."""
+    product = rows.T @ (matrix @ rows)
+    return np.asarray(product.toarray() if sparse.issparse(product) else product)
 
 
 def sample_points() -> Floats:

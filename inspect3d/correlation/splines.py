@@ -18,7 +18,6 @@ from inspect3d.nominal.nurbs_face import nurbs_of
 from inspect3d.outcome import InputError, MeasurementError
 
 ENOUGH = 1.5  # nodes for each control point, at the least
-TOLD_APART = 1e-9  # reciprocal condition of the functions at the nodes
 
 
 @dataclass(frozen=True)

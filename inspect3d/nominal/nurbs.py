@@ -70,7 +70,8 @@ class Nurbs:
     def functions(self, uv: Floats) -> sparse.csr_matrix:
         """Return R (n, a b), what each control point weighs at parameters (n, 2); rows add up to one."""
         product = self._products(uv)[0]
-        return sparse.diags(1 / np.asarray(product.sum(axis=1)).ravel()) @ product
+        product.data /= np.repeat(np.asarray(product.sum(axis=1)).ravel(), np.diff(product.indptr))
+        return product
 
     def points(self, uv: Floats) -> Floats:
         """Return S (n, 3) mm."""
@@ -174,10 +175,11 @@ class Nurbs:
             _functions(knots, degree, within[:, axis], slopes)
             for axis, (knots, degree) in enumerate(zip((self.knots_u, self.knots_v), self.degrees, strict=True))
         ]
-        weights = sparse.diags(self.weights.ravel())
-        found = [_rowwise(both[0][0], both[1][0]) @ weights]
+        found = [_rowwise(both[0][0], both[1][0])]
         if slopes:
-            found += [_rowwise(both[0][1], both[1][0]) @ weights, _rowwise(both[0][0], both[1][1]) @ weights]
+            found += [_rowwise(both[0][1], both[1][0]), _rowwise(both[0][0], both[1][1])]
+        for product in found:
+            product.data *= self.weights.ravel()[product.indices]
         return found
 
 
