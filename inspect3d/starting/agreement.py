@@ -20,6 +20,7 @@ LIFT = 1e-3  # of the diagonal
 HALF = 6  # samples of a patch on either side of its middle
 SPACING = 2.0  # px between them
 CORRELATED = 0.6  # least correlation coefficient of patches that agree
+FAR = 1e6  # px, where points appear that the distortion of the lens does not hold for
 FLAT = 1.0  # grey levels, contrast below which there is nothing to compare
 
 
@@ -66,7 +67,7 @@ def agreement(surface: Surface, views: Sequence[View], stack: Stack, masks: Sequ
 def _seen(surface: Surface, view: View, points: Floats, normals: Floats, mask: Booleans | None) -> Booleans:
     sight = unit(view.centre - points)
     seen = np.asarray((np.einsum("ni,ni->n", sight, normals) > STEEPEST) & (view.depth(points) > 0))
-    at = np.rint(view.project(points[seen])).astype(int)
+    at = np.rint(np.nan_to_num(view.project(points[seen]), nan=FAR, posinf=FAR, neginf=-FAR)).astype(int)
     margin = int(SPACING * HALF) + 2
     width, height = view.camera.size
     inside = np.asarray(((at >= margin) & (at < np.array([width, height]) - margin)).all(axis=1))

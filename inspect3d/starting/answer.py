@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from inspect3d.arrays import Floats
 from inspect3d.camera import View
+from inspect3d.nominal.surface import Surface
+from inspect3d.pose import Pose
 from inspect3d.register.choice import choose
 from inspect3d.register.icp import Fit
 from inspect3d.register.landmarks import pose_from_landmarks
@@ -21,6 +23,7 @@ ON = 2e-3  # share of the CAD's diagonal within which a point lies on it
 BELIEVED = 0.7  # least share of the points before the CAD that lie on it, and of its surface on which pictures agree
 WORSE = 0.15  # share by which agreement or outline must fall behind to rule a start out
 MISSING = 0.06  # and share by which the points on the CAD must
+TIED = 0.03  # of the outline, below which two places are alike
 APART = 0.03  # share of the diagonal below which two starts are the same
 
 
@@ -32,14 +35,14 @@ class Trial:
     ----------
     fit : cameras and points on the CAD
     agreement : of the pictures on the nominal surface
-    bareness : share of the part that would appear where the pictures show nothing
+    unlike : share of the part that would appear beside the texture, and of the features beside the part
     explained : share of the points before the CAD that lie on it
     count : of the points that lie on it
     """
 
     fit: Fitted
     agreement: Agreement
-    bareness: float
+    unlike: float
     explained: float
     count: int
 
@@ -56,7 +59,7 @@ class Trial:
     @property
     def merit(self) -> float:
         """Return what speaks for the start as one number, 0 to 1."""
-        return self.explained * self.agreement.share * (1 - self.bareness)
+        return self.explained * self.agreement.share * max(1 - self.unlike, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,12 +78,17 @@ class Answer:
     best: Trial
 
 
-def answer(trials: Sequence[Trial], smooth: Smooth) -> Answer:
+def answer(trials: Sequence[Trial], smooth: Smooth, unlike: Callable[[Sequence[View]], float]) -> Answer:
     """Return which of the trials, all of the same points, the data choose.
 
     A trial that the pictures contradict is ruled out by their agreement on the nominal surface, or by its outline; the
     rest are compared point by point, see `choose`. Those that a symmetry of the CAD or a free motion makes equal are
-    one: of the symmetric ones that with the smallest rotation before the first camera, else the best.
+    one: of the symmetric ones that with the smallest rotation before the first camera, else the best. Places between
+    which no way leads along which the outline fits are several.
+
+    Parameters
+    ----------
+    unlike : how badly the outline fits with cameras in given places
     """
     ranked = sorted(trials, key=lambda trial: -trial.merit)
     best = ranked[0]
@@ -88,7 +96,7 @@ def answer(trials: Sequence[Trial], smooth: Smooth) -> Answer:
         return Answer((), False, best)
     kept: list[Trial] = []
     for trial in ranked:
-        behind = best.agreement.share - trial.agreement.share, trial.bareness - best.bareness
+        behind = best.agreement.share - trial.agreement.share, trial.unlike - best.unlike
         unexplained = best.explained - trial.explained
         if max(behind) < WORSE and unexplained < MISSING and all(_apart(trial, other, smooth) for other in kept):
             kept.append(trial)
@@ -97,8 +105,23 @@ def answer(trials: Sequence[Trial], smooth: Smooth) -> Answer:
     of = {id(fit): trial for fit, trial in zip(fits, kept, strict=True)}
     equal = sorted((of[id(fit)] for fit in choice.equivalent), key=lambda trial: -trial.merit)
     chosen = of[id(choice.fit)] if choice.by_symmetry else equal[0]
-    rivals = tuple(of[id(fit)] for fit in choice.rivals if of[id(fit)].believed)
+    rivals = [of[id(fit)] for fit in choice.rivals if of[id(fit)].believed]
+    if not choice.by_symmetry:
+        rivals += [trial for trial in equal[1:] if _barred(chosen, trial, unlike)]
     return Answer((chosen, *rivals), choice.by_symmetry, best)
+
+
+def _barred(one: Trial, other: Trial, unlike: Callable[[Sequence[View]], float]) -> bool:
+    """Tell whether the outline fits in both places as well, but not half-way: then they are no free motion."""
+    if other.unlike > one.unlike + TIED or not other.believed:
+        return False
+    points = one.fit.bundle.points
+    motion = pose_from_landmarks(points, other.fit.bundle.points)
+    centre = points.mean(axis=0)
+    shift = motion(centre[None])[0] - centre
+    half = Pose.small(np.concatenate([motion.rotation_vector / 2, shift / 2]), centre).inverse()
+    views = [replace(view, camera_from_cad=view.camera_from_cad @ half) for view in one.views]
+    return unlike(views) > other.unlike + TIED
 
 
 def _apart(one: Trial, other: Trial, smooth: Smooth) -> bool:
@@ -115,13 +138,13 @@ def _as_fit(trial: Trial, first: Trial, smooth: Smooth) -> Fit:
     return Fit(Similarity(pose), trial.fit.feet, agrees, 1.4826 * scale)
 
 
-def explained(fit: Fitted, smooth: Smooth) -> tuple[float, int]:
+def explained(fit: Fitted, surface: Surface) -> tuple[float, int]:
     """Return the share of the points before the CAD that lie on it, and their count.
 
     A point is before or behind the CAD if the line of sight of a camera through it meets the CAD anywhere; others are
     background.
     """
-    surface, points = smooth.surface, fit.bundle.points
+    points = fit.bundle.points
     on = fit.distance < ON * surface.diagonal
     meets = np.zeros(len(points), bool)
     for k, view in enumerate(fit.bundle.views):

@@ -12,7 +12,7 @@ from inspect3d.correlation.freedom import Freedom
 from inspect3d.pose import Pose
 from inspect3d.register.similarity import Similarity
 
-FIRM, STIFF = 1e-9, 1e-4  # damping at first and after a refused step, as a share of the normal matrix's diagonal
+FIRM, STIFF = 1e-9, 1e-4  # least damping and that after a refused step, as a share of the normal matrix's diagonal
 STEADY = 1e-5
 LEAST = 1e-10  # share of the largest eigenvalue below which a motion of the cameras is held: those of all together
 TRIES = 8
@@ -110,7 +110,9 @@ class Adjusted:
     cost: float
 
 
-def adjusted(bundle: Bundle, freedom: Freedom, noise: float, planes: Planes | None = None, steps: int = 20) -> Adjusted:
+def adjusted(
+    bundle: Bundle, freedom: Freedom, noise: float, planes: Planes | None = None, steps: int = 20, firm: float = FIRM
+) -> Adjusted:
     """Return the bundle that fits pixels, priors and planes best, by Levenberg-Marquardt with the points eliminated.
 
     A point is weighted down the more, the farther it appears from where it was found (Geman and McClure's weights).
@@ -118,24 +120,25 @@ def adjusted(bundle: Bundle, freedom: Freedom, noise: float, planes: Planes | No
     Parameters
     ----------
     noise : px, standard uncertainty of a pixel
+    firm : least damping, as a share of the normal matrix's diagonal: what is determined less stays where it is
 
     Notes
     -----
     B. Triggs and others, "Bundle adjustment: a modern synthesis", Vision Algorithms: Theory and Practice, 2000.
     """
-    damping = FIRM
+    damping = firm
     parts = _normal(bundle, freedom, noise, planes, damping)
     for _ in range(steps):
         moved, then = bundle, parts
         for _ in range(TRIES):
             moved = _moved(bundle, freedom, parts, damping)
-            then = _normal(moved, freedom, noise, planes, max(damping / 10, FIRM))
+            then = _normal(moved, freedom, noise, planes, max(damping / 10, firm))
             if then.cost <= parts.cost:
                 break
             damping = max(10 * damping, STIFF)
         if not then.cost <= parts.cost:
             break
-        gain, bundle, parts, damping = parts.cost - then.cost, moved, then, max(damping / 10, FIRM)
+        gain, bundle, parts, damping = parts.cost - then.cost, moved, then, max(damping / 10, firm)
         if gain < STEADY * parts.cost:
             break
     return Adjusted(bundle, parts.cost)

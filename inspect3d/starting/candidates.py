@@ -45,7 +45,7 @@ class Candidates:
 
     surface: Surface
     field: Field
-    kept: int = 8
+    kept: int = 6
 
     def __call__(self, cloud: Thinned, rig: Sequence[View], texture: Texture, scaled: bool) -> list[Similarity]:
         """Return places cad_from_cloud, best first.

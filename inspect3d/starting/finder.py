@@ -24,22 +24,25 @@ from inspect3d.register.field import Field
 from inspect3d.register.similarity import Similarity
 from inspect3d.register.smooth import Smooth
 from inspect3d.register.symmetry import surface_points
-from inspect3d.register.thinned import Thinned, thinned
+from inspect3d.register.thinned import thinned
 from inspect3d.starting.agreement import agreement
 from inspect3d.starting.answer import Answer, Trial, answer, explained
 from inspect3d.starting.bundle import Bundle
 from inspect3d.starting.candidates import Candidates
 from inspect3d.starting.features import Features, features
-from inspect3d.starting.fitting import fitted
+from inspect3d.starting.fitting import FINAL, Fitted, fitted
+from inspect3d.starting.outlined import Outline, weak_motions
 from inspect3d.starting.relative import relative, triangulated
-from inspect3d.starting.texture import Texture, stacked
+from inspect3d.starting.texture import Texture
 from inspect3d.starting.tracks import tracks
 
 NOISE = 0.3  # px of the reduced pictures, of a feature's place
 CLOUD = 900  # points that stand for all where the part is searched
+TRIED = 4  # places that are fitted to the outline and compared
+FLAT = 3  # weak motions, from which on points lie on one flat face only
 STRIDE = 2  # of them, every so many-th is fitted
 BLUR = 1.5  # px of the reduced pictures, in which patches are compared
-OUTLINE = 500  # points over the part by which its outline is judged
+OUTLINE = 1500  # points over the part by which its outline is judged
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,12 +106,14 @@ class FindStart:
         else:
             cameras, lenses = [each.camera for each in pictured], [each.lens for each in pictured]
             bundles = tuple(self._resized(each) for each in relative(cameras, lenses, pixels, noise))
-        texture = Texture.of(found, [each.camera.size for each in pictured])
+        sizes = [each.camera.size for each in pictured]
+        texture = Texture.of(found, sizes)
+        outline = Outline.of(found, sizes, surface_points(self.nominal.surface, OUTLINE)[0])
         stack = Pictures([each.grey for each in pictured]).blurred(BLUR * step)
         answers = []
         for k, bundle in enumerate(bundles):
             progress.update(0.55 + 0.4 * k / len(bundles), "searching the part")
-            answers.append(self._answer(bundle, pictured, bool(rig), cad_from_first, texture, stack, noise))
+            answers.append(self._answer(bundle, pictured, bool(rig), cad_from_first, texture, outline, stack, noise))
         progress.update(1.0, "searching the part")
         return max(answers, key=lambda each: (bool(each.trials), each.best.count * each.best.agreement.share))
 
@@ -145,6 +150,7 @@ class FindStart:
         scaled: bool,
         cad_from_first: Pose | None,
         texture: Texture,
+        outline: Outline,
         stack: Stack,
         noise: float,
     ) -> Answer:
@@ -158,27 +164,35 @@ class FindStart:
             places = Candidates(self.nominal.surface, self._field)(cloud, bundle.views, texture, scaled)
         freedom = _Free(tuple(each.camera for each in pictured), tuple(each.lens for each in pictured), scaled)
         masks = [each.mask for each in pictured]
-        trials = [self._trial(part, few, place, freedom, texture, stack, masks, noise) for place in places]
-        return answer(trials, self._smooth)
+        surface = self.nominal.surface
+        fits = [fitted(part.placed(each), each.turned(few.normals), surface, freedom, noise) for each in places]
+        merits = [explained(fit, surface)[0] * (1 - outline.unlike(fit.bundle.views, surface)) for fit in fits]
+        best = np.argsort(merits)[::-1][:TRIED]
+        trials = [
+            self._trial(fits[k], places[k].turned(few.normals), freedom, outline, stack, masks, noise) for k in best
+        ]
+        first = max(trials, key=lambda trial: trial.merit)
+        for turned in _turned_about(first.fit, scaled):
+            fit = fitted(turned.bundle, turned.normals, surface, freedom, noise, FINAL)
+            trials.append(self._trial(fit, turned.normals, freedom, outline, stack, masks, noise))
+        return answer(trials, self._smooth, lambda views: outline.unlike(views, surface))
 
     def _trial(
         self,
-        part: Bundle,
-        few: Thinned,
-        place: Similarity,
+        fit: Fitted,
+        normals: Floats,
         freedom: _Free,
-        texture: Texture,
+        outline: Outline,
         stack: Stack,
         masks: Sequence[Booleans | None],
         noise: float,
     ) -> Trial:
         surface = self.nominal.surface
-        fit = fitted(part.placed(place), place.turned(few.normals), surface, freedom, noise)
-        views = fit.bundle.views
-        over, _ = surface_points(surface, OUTLINE)
-        bare = float(texture.bareness(views, stacked([Similarity.identity()]), over)[0])
-        share, count = explained(fit, self._smooth)
-        return Trial(fit, agreement(surface, views, stack, masks), bare, share, count)
+        bundle, unlike = outline.fitted(fit, surface, freedom.rigid)
+        if bundle is not fit.bundle:
+            fit = fitted(bundle, normals, surface, freedom, noise, FINAL)
+        share, count = explained(fit, surface)
+        return Trial(fit, agreement(surface, fit.bundle.views, stack, masks), unlike, share, count)
 
     def _scaled(self, bundle: Bundle, cad_from_first: Pose) -> Similarity:
         """Return the place that a stated place of the first camera gives: its lines of sight tell the scale."""
@@ -193,6 +207,30 @@ class FindStart:
             )
         scale = float(np.median(hits.distance[met] / np.linalg.norm(sights[met], axis=1)))
         return Similarity(cad_from_first, scale)
+
+
+@dataclass(frozen=True, eq=False)
+class _Turned:
+    """A bundle on the CAD, and the normals of its points."""
+
+    bundle: Bundle
+    normals: Floats
+
+
+def _turned_about(fit: Fitted, scaled: bool) -> list[_Turned]:
+    """Return the same points turned by a quarter, a half and three quarters where they lie on one flat face only.
+
+    There the outline alone tells which way round the part is, and a way that was not searched could not be told from.
+    """
+    weak, centre = weak_motions(fit, scaled)
+    if weak.shape[1] < FLAT:
+        return []
+    axis = unit(np.median(fit.feet.normals, axis=0))
+    found = []
+    for quarter in (1, 2, 3):
+        motion = Similarity(Pose.small(np.append(quarter * np.pi / 2 * axis, np.zeros(3)), centre))
+        found.append(_Turned(fit.bundle.placed(motion), motion.turned(fit.feet.normals)))
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,9 @@ from inspect3d.starting.bundle import Bundle, Planes, adjusted
 
 WIDTHS = (0.02, 0.012, 0.008, 0.005, 0.003, 0.002, 0.001, 0.0007, 0.0005, 0.0005)
 """Shares of the CAD's diagonal that points may be off it, from the first fit to the last."""
+FINAL = WIDTHS[5:]
 OPPOSED = 0.3
+HELD = 1e-6  # damping of the adjustment, which keeps motions at rest that the points on the CAD leave free
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +47,7 @@ def fitted(
     surface: Surface,
     freedom: Callable[[tuple[View, ...]], Freedom],
     noise: float,
+    widths: Sequence[float] = WIDTHS,
 ) -> Fitted:
     """Return cameras and points fitted to the CAD, from coarse to fine.
 
@@ -58,15 +61,16 @@ def fitted(
     normals : (n, 3), unit, of the points, towards the cameras; zero where unknown
     freedom : what may change about cameras at given places
     noise : px, of a feature's place
+    widths : shares of the CAD's diagonal that points may be off it, from the first fit to the last
     """
     turned = normals
-    for share in WIDTHS:
+    for share in widths:
         there = _on(bundle, turned, surface)
         width = share * surface.diagonal
         usable = (there.distance < 4 * width)[:, None]
         planes = Planes(there.feet.points, np.where(usable, there.feet.normals, 0.0), width)
         before = bundle
-        bundle = adjusted(bundle, freedom(bundle.views), noise, planes, steps=4).bundle
+        bundle = adjusted(bundle, freedom(bundle.views), noise, planes, steps=4, firm=HELD).bundle
         turn = bundle.views[0].camera_from_cad.rotation.T @ before.views[0].camera_from_cad.rotation
         turned = turned @ turn.T
     return _on(bundle, turned, surface)

@@ -15,6 +15,7 @@ from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.outcome import MeasurementError
 from inspect3d.pose import Pose
 from inspect3d.starting.bundle import Bundle, adjusted
+from inspect3d.starting.epipolar import epipolar
 
 STRAY = 4.0  # noises within which a track obeys the cameras, before these are adjusted
 AGREES = 3.0  # and after
@@ -135,9 +136,9 @@ def _epipolar_poses(one: Floats, other: Floats, reach: float) -> list[Pose]:
     import cv2
 
     found: list[tuple[Any, Any]] = []
-    essential, good = cv2.findEssentialMat(one, other, np.eye(3), cv2.USAC_MAGSAC, 0.9999, reach)
-    if essential is not None and essential.shape == (3, 3):
-        turns = cv2.decomposeEssentialMat(essential)
+    common = epipolar(one, other, reach)
+    if common is not None:
+        turns = cv2.decomposeEssentialMat(common.essential)
         found += [(turn, side * turns[2].ravel()) for turn in turns[:2] for side in (1.0, -1.0)]
     plane, good = cv2.findHomography(one, other, cv2.USAC_MAGSAC, reach)
     if plane is not None and good.mean() > 0.3:

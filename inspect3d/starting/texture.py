@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from inspect3d.arrays import Booleans, Floats
 from inspect3d.camera import View
@@ -14,6 +16,8 @@ from inspect3d.starting.features import Features
 
 CELLS = 160  # along the longer side of a picture
 Places = tuple[Floats, Floats, Floats]
+FINEST = 3.0  # px of the reduced picture, of a cell that shows the outline
+CLOSED = 4  # cells within which gaps of such are closed
 AROUND = 2  # cells around a feature that count as textured
 
 
@@ -35,6 +39,13 @@ class Texture:
         """Return where pictures of given sizes (px) have features, gaps between neighbours closed."""
         widths = tuple(max(size) / CELLS for size in sizes)
         return cls(tuple(map(_cells, found, sizes, widths)), widths)
+
+    @classmethod
+    def closed(cls, found: Sequence[Features], sizes: Sequence[tuple[int, int]]) -> Texture:
+        """Return where pictures of given sizes (px) have features, as finely as the distances of these tell."""
+        spacings = [_spacing(each.pixels) for each in found]
+        widths = tuple(max(FINEST * each.step, s / 2) for each, s in zip(found, spacings, strict=True))
+        return cls(tuple(map(_closed_cells, found, sizes, widths)), widths)
 
     def bareness(self, views: Sequence[View], places: Places, points_cad: Floats) -> Floats:
         """Return the share of the part that would appear where the pictures show nothing, for each of k places, (k,).
@@ -74,8 +85,32 @@ def stacked(places: Sequence[Similarity]) -> Places:
 def _cells(found: Features, size: tuple[int, int], width: float) -> Booleans:
     import cv2
 
+    return np.asarray(cv2.dilate(_filled(found, size, width), _disc(AROUND)) > 0)
+
+
+def _closed_cells(found: Features, size: tuple[int, int], width: float) -> Booleans:
+    import cv2
+
+    framed = cv2.copyMakeBorder(_filled(found, size, width), *(2 * CLOSED,) * 4, cv2.BORDER_REPLICATE)
+    closed = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, _disc(CLOSED))
+    return np.asarray(closed[2 * CLOSED : -2 * CLOSED, 2 * CLOSED : -2 * CLOSED] > 0)
+
+
+def _filled(found: Features, size: tuple[int, int], width: float) -> NDArray[np.uint8]:
     cells = np.zeros((int(np.ceil(size[1] / width)), int(np.ceil(size[0] / width))), np.uint8)
     at = np.floor((found.pixels + 0.5) / width).astype(int)
     cells[np.clip(at[:, 1], 0, cells.shape[0] - 1), np.clip(at[:, 0], 0, cells.shape[1] - 1)] = 1
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * AROUND + 1,) * 2)
-    return np.asarray(cv2.dilate(cells, disc) > 0)
+    return cells
+
+
+def _disc(radius: int) -> NDArray[np.uint8]:
+    import cv2
+
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2), np.uint8)
+
+
+def _spacing(pixels: Floats) -> float:
+    """Return the usual distance of a feature to its nearest neighbour, px."""
+    if len(pixels) < 2:
+        return 0.0
+    return float(np.median(cKDTree(pixels).query(pixels[:2000], 2)[0][:, 1]))

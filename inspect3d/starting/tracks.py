@@ -7,7 +7,8 @@ from itertools import combinations
 
 import numpy as np
 
-from inspect3d.arrays import Booleans, Floats, Integers
+from inspect3d.arrays import Floats, Integers
+from inspect3d.starting.epipolar import epipolar
 from inspect3d.starting.features import Features
 
 RATIO = 0.85  # of the distances to the most and the second most alike feature, above which a match is a guess
@@ -33,7 +34,8 @@ def tracks(found: Sequence[Features], rays: Sequence[Floats], focals: Sequence[f
         match = _matches(found[one], found[other])
         if len(match) >= FEWEST:
             reach = STRAY * max(found[one].step / focals[one], found[other].step / focals[other])
-            match = match[_consistent(rays[one][match[:, 0]], rays[other][match[:, 1]], reach)]
+            common = epipolar(rays[one][match[:, 0]], rays[other][match[:, 1]], reach)
+            match = match[common.good] if common else match[:0]
         if len(match) >= FEWEST:
             pairs.append(match + starts[[one, other]])
     return _joined(np.concatenate(pairs), found, starts)
@@ -53,13 +55,6 @@ def _matches(one: Features, other: Features) -> Integers:
     mutual = back[best] == row
     kept = np.flatnonzero(clear & mutual)
     return np.stack([kept, best[kept]], axis=1)
-
-
-def _consistent(one: Floats, other: Floats, reach: float) -> Booleans:
-    import cv2
-
-    _, good = cv2.findFundamentalMat(one, other, cv2.USAC_MAGSAC, reach, 0.9999, 5000)
-    return np.zeros(len(one), bool) if good is None else good.ravel().astype(bool)
 
 
 def _joined(pairs: Integers, found: Sequence[Features], starts: Integers) -> Floats:
