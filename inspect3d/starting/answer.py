@@ -16,6 +16,7 @@ from inspect3d.register.icp import Fit
 from inspect3d.register.landmarks import pose_from_landmarks
 from inspect3d.register.similarity import Similarity
 from inspect3d.register.smooth import Smooth
+from inspect3d.register.symmetry import surface_points
 from inspect3d.starting.agreement import Agreement
 from inspect3d.starting.fitting import Fitted
 
@@ -24,6 +25,7 @@ BELIEVED = 0.7  # least share of the points before the CAD that lie on it, and o
 WORSE = 0.15  # share by which agreement or outline must fall behind to rule a start out
 MISSING = 0.06  # and share by which the points on the CAD must
 TIED = 0.03  # of the outline, below which two places are alike
+OVERLAP, NEAR, ALIKE = 1000, 0.01, 0.8  # points, share of the diagonal, and share of a CAD that lies on itself again
 APART = 0.03  # share of the diagonal below which two starts are the same
 
 
@@ -107,21 +109,34 @@ def answer(trials: Sequence[Trial], smooth: Smooth, unlike: Callable[[Sequence[V
     chosen = of[id(choice.fit)] if choice.by_symmetry else equal[0]
     rivals = [of[id(fit)] for fit in choice.rivals if of[id(fit)].believed]
     if not choice.by_symmetry:
-        rivals += [trial for trial in equal[1:] if _barred(chosen, trial, unlike)]
+        rivals += [trial for trial in equal[1:] if _barred(chosen, trial, smooth.surface, unlike)]
     return Answer((chosen, *rivals), choice.by_symmetry, best)
 
 
-def _barred(one: Trial, other: Trial, unlike: Callable[[Sequence[View]], float]) -> bool:
-    """Tell whether the outline fits in both places as well, but not half-way: then they are no free motion."""
+def _barred(one: Trial, other: Trial, surface: Surface, unlike: Callable[[Sequence[View]], float]) -> bool:
+    """Tell whether the outline fits in both places as well, but not half-way: then no free motion joins them.
+
+    A symmetry of the CAD may, as one that swaps the ends of a piece of a cylinder, which has slid a little besides.
+    """
     if other.unlike > one.unlike + TIED or not other.believed:
         return False
     points = one.fit.bundle.points
     motion = pose_from_landmarks(points, other.fit.bundle.points)
+    if all(_overlap(surface, there) > ALIKE for there in (motion, motion.inverse())):
+        return False
     centre = points.mean(axis=0)
     shift = motion(centre[None])[0] - centre
     half = Pose.small(np.concatenate([motion.rotation_vector / 2, shift / 2]), centre).inverse()
     views = [replace(view, camera_from_cad=view.camera_from_cad @ half) for view in one.views]
     return unlike(views) > other.unlike + TIED
+
+
+def _overlap(surface: Surface, motion: Pose) -> float:
+    """Return the share of the CAD that lies on it after a motion."""
+    points, normals = surface_points(surface, OVERLAP)
+    feet = surface.closest(motion(points))
+    cosine = np.einsum("ni,ni->n", motion.turned(normals), feet.normals)
+    return float(((np.abs(feet.distance) < NEAR * surface.diagonal) & (cosine > 0.5)).mean())
 
 
 def _apart(one: Trial, other: Trial, smooth: Smooth) -> bool:
