@@ -12,11 +12,12 @@ from inspect3d.camera import View
 from inspect3d.nominal.surface import Surface
 from inspect3d.pose import Pose
 from inspect3d.register.choice import choose
-from inspect3d.register.icp import Fit
+from inspect3d.register.icp import Fit, RobustIcp
 from inspect3d.register.landmarks import pose_from_landmarks
 from inspect3d.register.similarity import Similarity
 from inspect3d.register.smooth import Smooth
-from inspect3d.register.symmetry import surface_points
+from inspect3d.register.symmetry import is_symmetry, surface_points
+from inspect3d.register.thinned import Thinned
 from inspect3d.starting.agreement import Agreement
 from inspect3d.starting.fitting import Fitted
 
@@ -25,7 +26,9 @@ BELIEVED = 0.7  # least share of the points before the CAD that lie on it, and o
 WORSE = 0.15  # share by which agreement or outline must fall behind to rule a start out
 MISSING = 0.06  # and share by which the points on the CAD must
 TIED = 0.03  # of the outline, below which two places are alike
-OVERLAP, NEAR, ALIKE = 1000, 0.01, 0.8  # points, share of the diagonal, and share of a CAD that lies on itself again
+OVERLAP = 1000  # points of the CAD that are laid on it again
+SLID, ALIKE = 0.01, 0.8  # share of the diagonal within which, and share of them that then lie on it
+NEAR = 0.05  # share of the diagonal by which a place may be off a symmetry
 APART = 0.03  # share of the diagonal below which two starts are the same
 
 
@@ -106,11 +109,23 @@ def answer(trials: Sequence[Trial], smooth: Smooth, unlike: Callable[[Sequence[V
     choice = choose(fits, smooth, kept[0].fit.bundle.points)
     of = {id(fit): trial for fit, trial in zip(fits, kept, strict=True)}
     equal = sorted((of[id(fit)] for fit in choice.equivalent), key=lambda trial: -trial.merit)
-    chosen = of[id(choice.fit)] if choice.by_symmetry else equal[0]
     rivals = [of[id(fit)] for fit in choice.rivals if of[id(fit)].believed]
     if not choice.by_symmetry:
-        rivals += [trial for trial in equal[1:] if _barred(chosen, trial, smooth.surface, unlike)]
-    return Answer((chosen, *rivals), choice.by_symmetry, best)
+        rivals += [trial for trial in equal[1:] if _barred(equal[0], trial, smooth.surface, unlike)]
+    twins = [trial for trial in rivals if _twin(equal[0], trial, smooth.surface)]
+    rivals = [trial for trial in rivals if trial not in twins]
+    symmetric = choice.by_symmetry or bool(twins)
+    same = [*equal, *twins] if choice.by_symmetry else [equal[0], *twins]
+    chosen = min(same, key=lambda trial: round(trial.views[0].camera_from_cad.angle, 2))
+    return Answer((chosen, *rivals), symmetric, best)
+
+
+def _twin(one: Trial, other: Trial, surface: Surface) -> bool:
+    """Tell whether a symmetry of the CAD makes two places one, but for what the points leave free."""
+    motion = pose_from_landmarks(one.fit.bundle.points, other.fit.bundle.points)
+    whole = Thinned(*surface_points(surface, OVERLAP), oriented=True)
+    brought = RobustIcp(steps=30, still=0.01, first_width=NEAR * surface.diagonal)(whole, surface, Similarity(motion))
+    return is_symmetry(surface, brought.pose.pose)
 
 
 def _barred(one: Trial, other: Trial, surface: Surface, unlike: Callable[[Sequence[View]], float]) -> bool:
@@ -136,7 +151,7 @@ def _overlap(surface: Surface, motion: Pose) -> float:
     points, normals = surface_points(surface, OVERLAP)
     feet = surface.closest(motion(points))
     cosine = np.einsum("ni,ni->n", motion.turned(normals), feet.normals)
-    return float(((np.abs(feet.distance) < NEAR * surface.diagonal) & (cosine > 0.5)).mean())
+    return float(((np.abs(feet.distance) < SLID * surface.diagonal) & (cosine > 0.5)).mean())
 
 
 def _apart(one: Trial, other: Trial, smooth: Smooth) -> bool:

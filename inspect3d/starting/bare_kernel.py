@@ -22,6 +22,8 @@ def bare_shares(
 ) -> Floats:
     """Return for each place of a rig (k,) the share of points of the part that would appear where no texture is.
 
+    Those that would appear in no picture do not count; of those behind a camera, all do.
+
     Parameters
     ----------
     rotations, translations, sizes : (k, 3, 3), (k, 3) and (k,), cad_from_rig with its scale
@@ -34,7 +36,7 @@ def bare_shares(
     matrices, distortions, turns, shifts = rig
     result = np.empty(len(rotations))
     for h in prange(len(rotations)):
-        missed = 0.0
+        missed, inside = 0.0, 0.0
         there = np.empty(3)
         for p in range(len(points)):
             for a in range(3):
@@ -47,10 +49,11 @@ def bare_shares(
                     matrices[k], distortions[k], turns[k], shifts[k], there[0], there[1], there[2]
                 )
                 if not depth > 0.0:
-                    missed += 1.0
+                    missed, inside = missed + 1.0, inside + 1.0
                     continue
                 column, row = (x + 0.5) / widths[k], (y + 0.5) / widths[k]
                 if column >= 0.0 and row >= 0.0 and column < counts[k, 1] and row < counts[k, 0]:
+                    inside += 1.0
                     missed += 0.0 if cells[k, int(row), int(column)] else 1.0
-        result[h] = missed / (len(points) * len(matrices))
+        result[h] = missed / inside if inside > 0.0 else 1.0
     return result
