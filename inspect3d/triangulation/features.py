@@ -53,6 +53,7 @@ class FindFeatures:
         """Return the features of a photograph, only where the mask (rows, columns) is True."""
         import pycolmap
 
+        pycolmap.logging.minloglevel = pycolmap.logging.FATAL.value
         options = pycolmap.FeatureExtractionOptions()
         options.use_gpu = False
         options.sift.max_num_features = self.most

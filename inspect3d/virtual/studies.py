@@ -35,6 +35,28 @@ name = "Milled block"
 cad = "part.step"
 element_size = 2.0               # mm
 tolerance = [-0.05, 0.05]        # mm
+
+[[part.features]]
+name = "mismatch"
+kind = "step"
+place = { box = [[46.5, 4, 15], [68, 44, 60]] }
+across = [1, 0, 0]
+point = [52, 0, 0]
+wavelength = 4.0
+
+[[part.features]]
+name = "errors of the facets"
+kind = "waviness"
+place = { box = [[14.5, 4, 15], [45.5, 44, 60]] }
+across = [1, 0, 0]
+wavelength = 16.0
+
+[[part.features]]
+name = "scallops"
+kind = "scallops"
+place = { box = [[53, 4, 15], [85, 44, 60]] }
+across = [1, 0, 0]
+wavelength = 4.0
 """
 
 LASER = """
@@ -65,7 +87,7 @@ MILLED_REPORT = """
 [report]
 formats = ["html", "pdf"]
 sections = [ { point = [50, 35, 25], normal = [0, 1, 0] } ]
-labels = [ { name = "mismatch", point = [55, 35, 29] } ]
+labels = [ { name = "mismatch", point = [54, 35, 29] } ]
 """
 
 
