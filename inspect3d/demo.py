@@ -13,12 +13,13 @@ class Demo(StrEnum):
     """What there is to see; the value is what the user types."""
 
     MILLED = "milled"
+    SMOOTH = "smooth"
     BRACKET = "bracket"
 
     @property
     def dataset(self) -> str:
         """Return the name of its virtual dataset."""
-        return {Demo.MILLED: "milled-study", Demo.BRACKET: "bracket"}[self]
+        return {Demo.MILLED: "milled-study", Demo.SMOOTH: "smooth-nurbs", Demo.BRACKET: "bracket"}[self]
 
 
 def demo_recipe(demo: Demo, folder: Path, progress: Progress) -> Path:

@@ -76,6 +76,14 @@ cameras = "{folder}calibration.json"
 coating = {{ thickness = 0.040, sigma = 0.005 }}
 
 [[measurements]]
+name = "splines"
+method = "isogeometric"          # the control points of the CAD's faces from the same two photographs
+images = ["{folder}view1.png", "{folder}view3.png"]
+cameras = "{folder}calibration.json"
+coating = {{ thickness = 0.040, sigma = 0.005 }}
+refine = 2                       # a CAD of few control points follows no defect: every span is quartered
+
+[[measurements]]
 name = "photogrammetry"
 method = "colmap"
 images = [{images}]
