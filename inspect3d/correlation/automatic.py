@@ -138,5 +138,5 @@ def _words(said: Answer) -> str:
         "visible surface."
     )
     if said.symmetric:
-        words += " The CAD is symmetric; of the equal places that with the smallest turn before the camera was taken."
+        words += " The CAD is symmetric; of the equal places the one that fits best was taken."
     return words

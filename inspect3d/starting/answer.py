@@ -88,8 +88,7 @@ def answer(trials: Sequence[Trial], smooth: Smooth, unlike: Callable[[Sequence[V
 
     A trial that the pictures contradict is ruled out by their agreement on the nominal surface, or by its outline; the
     rest are compared point by point, see `choose`. Those that a symmetry of the CAD or a free motion makes equal are
-    one: of the symmetric ones that with the smallest rotation before the first camera, else the best. Places between
-    which no way leads along which the outline fits are several.
+    one, the best of them. Places between which no way leads along which the outline fits are several.
 
     Parameters
     ----------
@@ -116,8 +115,7 @@ def answer(trials: Sequence[Trial], smooth: Smooth, unlike: Callable[[Sequence[V
     rivals = [trial for trial in rivals if trial not in twins]
     symmetric = choice.by_symmetry or bool(twins)
     same = [*equal, *twins] if choice.by_symmetry else [equal[0], *twins]
-    chosen = min(same, key=lambda trial: round(trial.views[0].camera_from_cad.angle, 2))
-    return Answer((chosen, *rivals), symmetric, best)
+    return Answer((max(same, key=lambda trial: trial.merit), *rivals), symmetric, best)
 
 
 def _twin(one: Trial, other: Trial, surface: Surface) -> bool:
