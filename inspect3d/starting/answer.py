@@ -25,6 +25,7 @@ ON = 2e-3  # share of the CAD's diagonal within which a point lies on it
 BELIEVED = 0.7  # least share of the points before the CAD that lie on it, and of its surface on which pictures agree
 WORSE = 0.15  # share by which agreement or outline must fall behind to rule a start out
 MISSING = 0.06  # and share by which the points on the CAD must
+SLIGHT = 0.01  # share of the points, below which a place is no worse, however sure it is that it is
 TIED = 0.03  # of the outline, below which two places are alike
 OVERLAP = 1000  # points of the CAD that are laid on it again
 SLID, ALIKE = 0.01, 0.8  # share of the diagonal within which, and share of them that then lie on it
@@ -107,15 +108,20 @@ def answer(trials: Sequence[Trial], smooth: Smooth, unlike: Callable[[Sequence[V
     fits = [_as_fit(trial, kept[0], smooth) for trial in kept]
     choice = choose(fits, smooth, kept[0].fit.bundle.points)
     of = {id(fit): trial for fit, trial in zip(fits, kept, strict=True)}
-    equal = sorted((of[id(fit)] for fit in choice.equivalent), key=lambda trial: -trial.merit)
+    least = min(_cost(fit, smooth) for fit in fits)
+    close = [fit for fit in choice.others if _cost(fit, smooth) < least + SLIGHT]
+    equal = sorted((of[id(fit)] for fit in (*choice.equivalent, *close)), key=lambda trial: -trial.merit)
     rivals = [of[id(fit)] for fit in choice.rivals if of[id(fit)].believed]
-    if not choice.by_symmetry:
-        rivals += [trial for trial in equal[1:] if _barred(equal[0], trial, smooth.surface, unlike)]
+    rivals += [trial for trial in equal[1:] if _barred(equal[0], trial, smooth.surface, unlike)]
     twins = [trial for trial in rivals if _twin(equal[0], trial, smooth.surface)]
     rivals = [trial for trial in rivals if trial not in twins]
     symmetric = choice.by_symmetry or bool(twins)
-    same = [*equal, *twins] if choice.by_symmetry else [equal[0], *twins]
-    return Answer((max(same, key=lambda trial: trial.merit), *rivals), symmetric, best)
+    return Answer((max((equal[0], *twins), key=lambda trial: trial.merit), *rivals), symmetric, best)
+
+
+def _cost(fit: Fit, smooth: Smooth) -> float:
+    """Return the share of the points off the CAD, those near it counting in part."""
+    return float(fit.cost(ON * smooth.surface.diagonal).mean())
 
 
 def _twin(one: Trial, other: Trial, surface: Surface) -> bool:
