@@ -14,7 +14,7 @@ from inspect3d.nominal.tessellation import Tessellation
 SNAP = 0.1
 """A node of a sharp edge or a corner lies nearer to its line than this share of the element size."""
 
-_SLIDE = 0.25
+_SLIDE = 0.35
 """Where faces gape a node may slide along their edge by this share of the element size."""
 
 _NEAR = 0.05

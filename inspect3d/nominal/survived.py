@@ -6,8 +6,12 @@ import faulthandler
 import os
 import resource
 import signal
+import time
 import warnings
 from collections.abc import Callable
+
+PATIENCE = 10  # times the processor time that is granted: a child that waits for a thread it does not have uses none
+TICK = 0.002  # s, between two looks at the child
 
 
 def survived(work: Callable[[], object], seconds: int) -> bool:
@@ -18,7 +22,7 @@ def survived(work: Callable[[], object], seconds: int) -> bool:
 
     Parameters
     ----------
-    seconds : of processor time, after which the child is ended
+    seconds : of processor time, after which the child is ended; of waiting, ten times as many
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # Python's, that a copy misses the other threads
@@ -31,12 +35,22 @@ def survived(work: Callable[[], object], seconds: int) -> bool:
         finally:
             os._exit(0)
     try:
-        _, status = os.waitpid(child, 0)
+        return os.WIFEXITED(_ended(child, time.monotonic() + PATIENCE * seconds))
     except KeyboardInterrupt:
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
         raise
-    return os.WIFEXITED(status)
+
+
+def _ended(child: int, deadline: float) -> int:
+    """Return with what status a child ended, which it is made to at the deadline."""
+    while time.monotonic() < deadline:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
+            return status
+        time.sleep(TICK)
+    os.kill(child, signal.SIGKILL)
+    return os.waitpid(child, 0)[1]
 
 
 def _hush() -> None:

@@ -173,16 +173,15 @@ class Pane {
       const facing = dot(near, [normals[3 * k], normals[3 * k + 1], normals[3 * k + 2]]) > 0;
       each.flag.hidden = !facing || this.surface.cutAway(this.surface.node(k)) || x < 0 || y < 0 || x > w || y > h;
       each.text.textContent = this.pinWords(each);
-      const beyond = 12 + each.tag.offsetWidth, flipped = x + beyond > w && x > w / 2 && beyond - x < x + beyond - w;
-      each.flag.classList.toggle("flipped", flipped);
       each.flag.style.transform = `translate(${x}px, ${y}px)`;
       if (each.flag.hidden) continue;
-      const width = each.tag.offsetWidth + 6, height = each.tag.offsetHeight + 3, left = flipped ? x - 9 - width : x + 9;
+      const width = each.tag.offsetWidth + 6, height = each.tag.offsetHeight + 3, left = Math.max(Math.min(x + 9, w - width), 3);
       let top = y - 28;
       const meets = (other) => left < other[0] + other[2] && other[0] < left + width && Math.abs(top - other[1]) < height;
       for (let found = taken.find(meets); found; found = taken.find(meets)) top = found[1] + height;
       taken.push([left, top, width]);
       each.tag.style.top = `${top - y}px`;
+      each.tag.style.left = `${left - x}px`;
     }
   }
   placeCompass() {
