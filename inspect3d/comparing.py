@@ -62,6 +62,8 @@ def compare_runs(folders: Sequence[Path], out: Path, progress: Progress | None =
     with replaced(out) as folder:
         with progress.stage("reading the inspections"):
             record = joined(folders)
+        if sum(part.deviation is not None for part in record.parts) < 2:
+            raise InputError("These inspections hold 1 map: a comparison needs two.")
         from inspect3d.report.write import write_report
 
         with progress.stage("writing the report"):
@@ -75,9 +77,8 @@ def joined(folders: Sequence[Path]) -> Record:
     names = _names(finished)
     runs = [_run(each, own) for each, own in zip(finished, names, strict=True)]
     meshes = [(run, run.mesh) for run in runs if run.mesh is not None]
-    count = sum(part.deviation is not None for run in runs for part in run.parts)
-    if count < 2:
-        raise InputError(f"These inspections hold {count} map{'' if count == 1 else 's'}: a comparison needs two.")
+    if not meshes:
+        raise InputError("No measurement of these inspections has a map: their reports say why.")
     first, mesh = meshes[0]
     for run, other in meshes[1:]:
         _require_same(first.finished.folder, mesh, run.finished.folder, other)

@@ -106,9 +106,9 @@ def test_runs_on_different_meshes_are_refused_with_the_reason(runs):
     assert not (folder / "never").exists()
 
 
-def test_one_map_is_nothing_to_compare(runs):
+def test_one_map_is_nothing_to_compare(runs, tmp_path):
     with pytest.raises(InputError, match="hold 1 map: a comparison needs two"):
-        joined([runs[0] / "only-a"])
+        compare_runs([runs[0] / "only-a"], tmp_path / "never")
 
 
 def test_a_folder_without_an_inspection_is_refused(tmp_path):
