@@ -19,6 +19,7 @@ from inspect3d.starting.texture import Texture, stacked
 
 WEAK = 0.03  # of the firmest motion's stiffness, below which a motion is weak
 ROUNDS, SHAKES = (0.02, 0.01, 0.005, 0.0025), 16  # shares of the diagonal, and tries in each
+SHRUNK = -0.5  # growth of the part below which a shake is no small motion
 SAMPLE = 200  # features of a picture that are asked whether they lie before the part
 ON = 4e-3  # share of the diagonal within which a point lies on the CAD
 
@@ -67,6 +68,8 @@ class Outline:
         for share in ROUNDS if weak.size else ():
             for _ in range(SHAKES):
                 motion = weak @ random.normal(0.0, share * surface.diagonal, weak.shape[1])
+                if motion[-1] < SHRUNK:
+                    continue
                 moved = now.placed(Similarity.small(motion, centre))
                 unlike = self.unlike(moved.views, surface)
                 then = unlike + _off(moved.points, surface)
