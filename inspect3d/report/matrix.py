@@ -11,9 +11,10 @@ from inspect3d.compare.comparison import Comparison
 from inspect3d.record import Record
 from inspect3d.report.canvas import PALE, Canvas
 from inspect3d.report.colour_bar import draw_colour_bar
-from inspect3d.report.colours import ColourScale, deviation_scale, symmetric_limits
+from inspect3d.report.colours import ColourScale
 from inspect3d.report.digits import number
 from inspect3d.report.layout import Layout
+from inspect3d.report.map_scale import map_scale
 from inspect3d.report.picture import Caption
 from inspect3d.report.viewpoint import Viewpoint
 from inspect3d.report.views import Views
@@ -27,16 +28,13 @@ def draw_matrix(record: Record, file: Path, views: Views, viewpoint: Viewpoint, 
 
     All maps have the same colours, so that they can be compared at a glance.
     """
-    mesh = record.nominal.mesh
     parts = [part for part in record.parts if part.status.has_map and part.deviation is not None][:MOST]
     pairs = {(each.a, each.b): each for each in record.comparisons}
     canvas = Canvas(layout.width, layout.height)
     u, count = canvas.unit, len(parts)
     left, top = 30 * u, 200 * u
     width, height = (layout.right - left) / count, (layout.height - 30 * u - top) / count
-    values = np.concatenate([part.deviation.value[part.deviation.observed] for part in parts if part.deviation])
-    areas = np.concatenate([mesh.areas[part.deviation.observed] for part in parts if part.deviation])
-    scale = deviation_scale(record.recipe.report.limits or symmetric_limits(values, areas))
+    scale = map_scale(record)
     subtitle = "All methods: deviation (diagonal), difference row − column (above), figures (below)"
     Caption(record.recipe.part.name, subtitle, f"one scale for all · seen from {viewpoint.words}").write(canvas)
     size = (int(width - 12 * u), int(height - 52 * u))

@@ -16,15 +16,14 @@ from inspect3d.report.bands import bands
 from inspect3d.report.colours import (
     ColourScale,
     band_scale,
-    deviation_scale,
     rising_limits,
     rising_scale,
-    symmetric_limits,
 )
 from inspect3d.report.digits import COVERAGE, decimals, number
 from inspect3d.report.figures import draw_figure
 from inspect3d.report.histogram import draw_histogram
 from inspect3d.report.layout import Layout
+from inspect3d.report.map_scale import map_scale
 from inspect3d.report.picture import Caption, Picture
 from inspect3d.report.reading import readings
 from inspect3d.report.viewpoint import Viewpoint
@@ -71,13 +70,6 @@ def start(shown: Mapping[str, tuple[Shown, ...]]) -> Viewpoint:
     """Return the viewpoint of the first picture of a measurement."""
     found = (each.viewpoint for name, pictures in shown.items() if name for each in pictures if each.viewpoint)
     return next(found, Viewpoint.of("iso"))
-
-
-def map_scale(record: Record, part: MeasuredPart) -> ColourScale:
-    """Return the colours of a deviation map: the recipe's limits, or limits that suit its values."""
-    if record.recipe.report.limits is not None:
-        return deviation_scale(record.recipe.report.limits)
-    return deviation_scale(symmetric_limits(*_observed(record, part)))
 
 
 def sigma_scale(record: Record, part: MeasuredPart) -> ColourScale:
@@ -136,7 +128,7 @@ def _draw_measurement(record: Record, part: MeasuredPart, folder: Path, views: V
                 shown.append(Shown(file, f"{words}, seen from {viewpoint.words}", viewpoint))
         return shown
 
-    scale = map_scale(record, part)
+    scale = map_scale(record)
     shown = pictures("deviation", "Deviation from the CAD model", deviation.value, scale, viewpoints)
     if part.verdict is not None:
         classes = np.where(bands(table, mesh, part) == 0, np.nan, bands(table, mesh, part))

@@ -30,7 +30,8 @@ from inspect3d.report.colours import (
     symmetric_limits,
 )
 from inspect3d.report.detail import Detail, distinct
-from inspect3d.report.pictures import map_scale, sigma_scale, spread_scale
+from inspect3d.report.map_scale import map_scale
+from inspect3d.report.pictures import sigma_scale, spread_scale
 from inspect3d.report.reading import readings
 from inspect3d.report.viewpoint import Viewpoint
 from inspect3d.report.worst import worst_places
@@ -99,7 +100,7 @@ def _map(record: Record, part: MeasuredPart, detail: Detail) -> dict[str, Any]:
     if deviation is None:
         return {}
     fields = [
-        _field("deviation", "deviation", deviation.value[detail.nodes], map_scale(record, part)),
+        _field("deviation", "deviation", deviation.value[detail.nodes], map_scale(record)),
         _field("sigma", "uncertainty (k = 1)", deviation.sigma[detail.nodes], sigma_scale(record, part)),
     ]
     if part.verdict is not None:
