@@ -105,17 +105,11 @@ def _of_clouds(
 ) -> MeasuredPart:
     """Return how a measurement of points ended: they are registered, and the map is fitted to them."""
     measurement = _at_reference_temperature(measurement, recipe.report.budget)
-    coating = table.coating or BARE
     with progress.stage("registering", table.name):
         alignments = _registered(measurement, table, nominal)
     with progress.stage("measuring deviations", table.name):
         deviate = Deviate(
-            refine=table.alignment.refined,
-            fit=fitted_to(table.alignment, nominal.mesh),
-            reach=table.reach,
-            coating=coating.thickness,
-            coating_sigma=coating.sigma,
-            calibration=recipe.report.budget.calibration,
+            **_settings(table, recipe, nominal),
             scale_known=measurement.scale_known,
             scale_sigma=measurement.scale_sigma,
         )
@@ -135,6 +129,19 @@ def _of_clouds(
     )
 
 
+def _settings(table: MeasurementTable, recipe: Recipe, nominal: Nominal) -> dict[str, Any]:
+    """Return what a recipe says about the map, whichever way it was measured."""
+    coating = table.coating or BARE
+    return {
+        "refine": table.alignment.refined,
+        "fit": fitted_to(table.alignment, nominal.mesh),
+        "reach": table.reach,
+        "coating": coating.thickness,
+        "coating_sigma": coating.sigma,
+        "calibration": recipe.report.budget.calibration,
+    }
+
+
 def _of_nodes(
     ended: MeasuredPart,
     measurement: NodalMeasurement,
@@ -144,15 +151,10 @@ def _of_nodes(
     progress: Progress,
 ) -> MeasuredPart:
     """Return how a measurement that moved the nodes ended: the map is there, and brought into the common alignment."""
-    growth, coating = _growth(recipe.report.budget), table.coating or BARE
+    growth = _growth(recipe.report.budget)
     with progress.stage("measuring deviations", table.name):
         deviate = DeviateNodes(
-            refine=table.alignment.refined,
-            fit=fitted_to(table.alignment, nominal.mesh),
-            reach=table.reach,
-            coating=coating.thickness,
-            coating_sigma=coating.sigma,
-            calibration=recipe.report.budget.calibration,
+            **_settings(table, recipe, nominal),
             growth=growth,
         )
         found = deviate(measurement, nominal, _counted(recipe, nominal))

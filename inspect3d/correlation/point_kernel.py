@@ -11,18 +11,26 @@ from inspect3d.camera_kernel import project_point
 BATCH = 64
 
 
+@njit(cache=True)
+def _between(values: Floats, corners: Integers, shape: Floats) -> tuple[float, float, float]:
+    """Return a nodal vector (n, 3) between the three corners of a facet, by their shares (3,)."""
+    a, b, c = corners
+    s, t, u = shape
+    return (
+        s * values[a, 0] + t * values[b, 0] + u * values[c, 0],
+        s * values[a, 1] + t * values[b, 1] + u * values[c, 1],
+        s * values[a, 2] + t * values[b, 2] + u * values[c, 2],
+    )
+
+
 @njit(cache=True, parallel=True, error_model="numpy")
 def interpolate(starts: Integers, shapes: Floats, corners: Integers, values: Floats, unit: bool, found: Floats) -> None:
     """Write nodal vectors (n, 3) interpolated at the points of each facet (p, 3), at length one if `unit`."""
     facets = len(corners)
     for batch in prange((facets + BATCH - 1) // BATCH):
         for f in range(batch * BATCH, min((batch + 1) * BATCH, facets)):
-            a, b, c = corners[f]
             for p in range(starts[f], starts[f + 1]):
-                s, t, u = shapes[p, 0], shapes[p, 1], shapes[p, 2]
-                x = s * values[a, 0] + t * values[b, 0] + u * values[c, 0]
-                y = s * values[a, 1] + t * values[b, 1] + u * values[c, 1]
-                z = s * values[a, 2] + t * values[b, 2] + u * values[c, 2]
+                x, y, z = _between(values, corners[f], shapes[p])
                 length = np.sqrt(x * x + y * y + z * z) if unit else 1.0
                 found[p, 0], found[p, 1], found[p, 2] = x / length, y / length, z / length
 
@@ -47,13 +55,9 @@ def bend(
     facets = len(corners)
     for batch in prange((facets + BATCH - 1) // BATCH):
         for f in range(batch * BATCH, min((batch + 1) * BATCH, facets)):
-            a, b, c = corners[f]
             for p in range(starts[f], starts[f + 1]):
-                s, t, u = shapes[p, 0], shapes[p, 1], shapes[p, 2]
-                x = s * normals[a, 0] + t * normals[b, 0] + u * normals[c, 0]
-                y = s * normals[a, 1] + t * normals[b, 1] + u * normals[c, 1]
-                z = s * normals[a, 2] + t * normals[b, 2] + u * normals[c, 2]
-                monomials = cubic_monomials(s, t, u)
+                x, y, z = _between(normals, corners[f], shapes[p])
+                monomials = cubic_monomials(shapes[p, 0], shapes[p, 1], shapes[p, 2])
                 lift = 0.0
                 for m in range(10):
                     lift += cubics[f, m] * monomials[m]
