@@ -7,50 +7,30 @@ import pytest
 from scipy import sparse
 from scipy.ndimage import gaussian_filter, spline_filter
 
-from inspect3d.camera import View
 from inspect3d.correlation.conjugate import conjugate
 from inspect3d.correlation.evaluation import centres, evaluation_points, points_per_edge
 from inspect3d.correlation.factor import Ordering
 from inspect3d.correlation.freedom import COLUMNS, Freedom, Lens
-from inspect3d.correlation.hidden import hidden_motions
-from inspect3d.correlation.linear import gauge_of, slides_of, system_of
-from inspect3d.correlation.normal import facets
 from inspect3d.correlation.picture import Pictures, Stack
 from inspect3d.correlation.reading_kernel import lens_slope
 from inspect3d.correlation.scene import scene
-from inspect3d.correlation.still import in_gauge, stilled
 from inspect3d.correlation.visibility import visibility
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.nominal.surface import Surface
-from inspect3d.pose import Pose
 from tests.jit import printed
+from tests.seen_sheets import STEEPEST, accumulated, flat_sheet, wavy_sheet
 from tests.sheets import plane, plane_normals, sheet
-from tests.speckled import Speckle, picture, rig
-
-STEEPEST = np.radians(65)
-ALL = np.arange(16)
+from tests.speckled import rig
 
 
 @pytest.fixture(scope="module")
 def flat():
-    """Return a flat sheet, two views of it, and what they see."""
-    nominal, views = sheet(plane, plane_normals, edge=9.0), rig()
-    return nominal, views, scene(nominal, views, 6.0, STEEPEST, [None, None])
+    return flat_sheet()
 
 
 @pytest.fixture(scope="module")
 def wavy():
-    """Return a wavy sheet, two views with distorting lenses, what they see, and exact pictures of it."""
-    nominal, views = sheet(edge=6.0), rig(distortion=(-0.1, 0.2, 1e-3, -1e-3, 0.1))
-    speckle = Speckle.drawn(np.random.default_rng(0), 0.7)
-    stack = Pictures([picture(view, speckle) for view in views]).blurred(0.0)
-    return nominal, views, scene(nominal, views, 4.0, STEEPEST, [None, None]), stack
-
-
-def accumulated(seen, stack, views, deviation=None, columns=ALL):
-    """Return what the pictures say, at the nominal shape unless told."""
-    deviation = np.zeros(len(seen.nodes)) if deviation is None else deviation
-    return facets(seen, stack, views, deviation, np.ones(len(seen.triangles)), columns, power=0)
+    return wavy_sheet()
 
 
 def test_a_sampled_picture_goes_through_its_pixels_and_its_gradient_is_its_slope():
@@ -165,105 +145,6 @@ def test_the_slopes_of_a_lens_are_those_of_its_projection():
         assert slope == pytest.approx((ahead - back) / 2e-3, rel=1e-6, abs=1e-8)
 
 
-def test_two_free_projection_matrices_hide_fifteen_motions_that_priors_name():
-    views, lowest = rig(), []
-    speckle = Speckle.drawn(np.random.default_rng(0), 0.7)
-    stack = Pictures([picture(view, speckle) for view in views]).blurred(0.0)
-    unknown = Lens(np.inf, np.inf, aspect=np.inf, skew=np.inf)
-    for edge in (3.0, 1.5):
-        seen = scene(sheet(edge=edge), views, 4.0, STEEPEST, [None, None])
-        system = camera_system(seen, stack, views, Freedom("free", (unknown,) * 2, views, seen.centre))
-        assert system.gauge.shape[1] == 7
-        units = system.scale * system.scale[:, None]
-        lowest.append(np.linalg.eigvalsh(system.reduced * units) / np.linalg.eigvalsh(system.camera * units)[-1])
-    falls = lowest[0][:9] / lowest[1][:9]
-    assert (falls[:8] > 2**3).all()  # what stiffness these eight have, the elements give them: it falls as edge⁴
-    assert falls[8] < 2
-    lens = Lens(30.0, 10.0, aspect=3.0, skew=3.0)
-    free = Freedom("free", (lens,) * 2, views, seen.centre)
-    system = camera_system(seen, stack, views, free)
-    assert len(system.unseen) == 0
-    told = sum(motion.prior for motion in hidden_motions(seen, system, free, 0.0))
-    assert told > 7.5  # of eight; the elements say a little about the last
-
-
-def test_a_stilled_step_slides_no_more_than_it_must_and_shows_the_same_disparities(wavy):
-    _, views, seen, _ = wavy
-    free = Freedom("free", (Lens(30.0, 10.0),) * 2, views, seen.centre)
-    random = np.random.default_rng(0)
-    cameras = 0.1 * free.scale(views, seen.nodes) * random.normal(size=free.unknowns)
-    shape = random.normal(0.0, 1e-3, len(seen.nodes))
-    plain = slides(seen, views, free.moved(views, cameras), shape)
-    shape, cameras = stilled(seen, free, views, np.zeros(len(seen.nodes)), shape, cameras)
-    still = slides(seen, views, free.moved(views, cameras), shape)
-    assert plain[0] - plain[1] == pytest.approx(still[0] - still[1], abs=2e-2 * np.abs(plain[0] - plain[1]).max())
-    assert np.abs(still.mean(axis=(0, 1))).max() < 0.02 * np.abs(plain.mean(axis=(0, 1))).max()
-
-
-def test_a_state_in_the_gauge_has_no_motion_of_the_part_and_shows_the_same_pictures(wavy):
-    _, views, seen, _ = wavy
-    free = Freedom("free", (Lens(),) * 2, views, seen.centre)
-    gauge = gauge_of(seen, free)
-    deviation = 1e-3 * gauge @ np.random.default_rng(0).normal(size=gauge.shape[1])
-    moved, left = in_gauge(seen, free, views, deviation)
-    assert left == pytest.approx(np.zeros(len(left)), abs=1e-12)
-    slid = slides(seen, views, moved, -deviation)
-    assert slid[0] == pytest.approx(slid[1], abs=1e-2 * np.abs(slid).max())
-
-
-def slides(seen, views, after, shape):
-    """Return how far over the surface each view's picture of each node slides in a step, (2, n, 2) mm."""
-    first = np.cross(seen.normals, [1.0, 0.0, 0.0])
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    found = []
-    for view, moved in zip(views, after, strict=True):
-        here = view.project(seen.nodes)
-        ways = [(view.project(seen.nodes + 1e-4 * t) - here) / 1e-4 for t in (first, np.cross(seen.normals, first))]
-        change = moved.project(seen.nodes + shape[:, None] * seen.normals) - here
-        found.append(np.einsum("nij,nj->ni", np.linalg.inv(np.stack(ways, axis=2)), change))
-    return np.stack(found)
-
-
-def camera_system(seen, stack, views, free):
-    """Return the linear system at the nominal shape for noise of 2.4 grey levels."""
-    found = accumulated(seen, stack, views, columns=free.columns)
-    slides = slides_of(seen, free, views)
-    return system_of(
-        seen, found, np.ones(len(found.node)), 2.4**2, free, free.columns, free.scale(views, seen.nodes), slides
-    )
-
-
-def test_moving_the_part_before_the_cameras_is_moving_its_nodes(wavy):
-    _, views, seen, stack = wavy
-    found = accumulated(seen, stack, views)
-    common = Freedom("common", (Lens(), Lens()), views, seen.centre)
-    mixing, _ = common.spread(ALL)
-    gauge = gauge_of(seen, common)
-    nodes = seen.assembled(found.node)
-    matrix = sparse.csr_matrix((nodes, seen.ordering.columns, seen.ordering.starts))
-    cross = seen.gathered(found.cross) @ mixing
-    camera = mixing.T @ found.camera @ mixing
-    from inspect3d.register.mobility import jacobian
-
-    fields = jacobian(seen.nodes, seen.normals, seen.centre)
-    assert np.linalg.matrix_rank(np.column_stack([gauge, fields])) == 6
-    stiffness = np.diag(fields.T @ (matrix @ fields))
-    slack = fields.T @ (matrix @ fields) - 2 * fields.T @ cross + camera
-    assert (np.abs(np.diag(slack)) < 0.02 * stiffness).all()
-
-
-def test_sliding_all_pictures_together_over_a_plane_has_no_stiffness_at_all(flat):
-    _, views, seen = flat
-    random = np.random.default_rng(0)
-    stack = Pictures([random.uniform(0, 255, (480, 620)) for _ in views]).blurred(0.5)
-    found = accumulated(seen, stack, views)
-    mixing, _ = Freedom("common", (Lens(), Lens()), views, seen.centre).spread(ALL)
-    stiffness = np.diag(mixing.T @ found.camera @ mixing)
-    alone = np.diag(found.camera)[:6]
-    assert (stiffness[[2, 3, 4]] < 1e-12 * alone[[2, 3, 4]]).all()
-    assert (stiffness[[0, 1, 5]] > 1e-3 * alone[[0, 1, 5]]).all()
-
-
 def test_gradient_noise_is_told_from_curvature(wavy):
     _, views, seen, stack = wavy
     random = np.random.default_rng(4)
@@ -312,33 +193,9 @@ def test_the_smoother_takes_the_bias_of_linear_elements_off_a_parabola():
     assert np.abs(smooth - wanted)[inner].max() < 0.0004
 
 
-def test_a_step_of_the_cameras_and_its_opposite_cancel():
-    views = rig()
-    free = Freedom("free", (Lens(10.0, 5.0, (0.1,) * 5, 2.0, 1.0),) * 2, views, np.array([30.0, 22.5, 0.0]))
-    step = np.random.default_rng(0).normal(0, 1e-3, free.unknowns) * free.scale(
-        views, np.array([[10.0, 10.0, 0.0]] * 2)
-    )
-    there = free.moved(views, step)
-    assert free.offset(there)[12:] == pytest.approx(step[12:])
-    for back, view in zip(free.moved(there, -step), views, strict=True):
-        assert back.camera.matrix == pytest.approx(view.camera.matrix)
-        assert back.camera_from_cad.matrix == pytest.approx(view.camera_from_cad.matrix, abs=1e-6)
-
-
-def test_the_gauge_of_free_poses_has_seven_fields_and_that_of_a_plane_four():
-    wavy, views = sheet(edge=9.0), rig()
-    for nominal, poses, count in ((wavy, "free", 7), (wavy, "common", 6), (wavy, "known", 0)):
-        seen = scene(nominal, views, 20.0, STEEPEST, [None, None])
-        gauge = gauge_of(seen, Freedom(poses, (Lens(), Lens()), views, seen.centre))
-        assert gauge.shape[1] == count
-        assert gauge.T @ gauge == pytest.approx(np.eye(count))
-    seen = scene(sheet(plane, plane_normals, edge=9.0), views, 20.0, STEEPEST, [None, None])
-    assert gauge_of(seen, Freedom("free", (Lens(), Lens()), views, seen.centre)).shape[1] == 3
-
-
 PROGRAM = """
 import numpy as np
-from tests.test_correlation_parts import ALL, STEEPEST, accumulated
+from tests.seen_sheets import ALL, STEEPEST, accumulated
 from tests.sheets import sheet
 from tests.speckled import rig
 from inspect3d.correlation.picture import Pictures
@@ -357,14 +214,6 @@ print(seen.ordering.factor(matrix).inverse_diagonal.sum())
 def test_the_kernels_say_the_same_with_the_compiler_on_and_off():
     compiled, plain = (np.array(printed(PROGRAM, jit).split(), float) for jit in (True, False))
     assert compiled == pytest.approx(plain, rel=1e-6)
-
-
-def test_a_view_that_moves_sees_what_a_part_that_moves_shows():
-    views = rig()
-    motion = Pose.small(np.array([1e-3, 2e-3, -1e-3, 0.1, 0.2, -0.1]), np.zeros(3))
-    points = np.random.default_rng(0).uniform(0, 40, (5, 3))
-    moved = View(views[0].camera, views[0].camera_from_cad @ motion)
-    assert moved.project(points) == pytest.approx(views[0].project(motion(points)))
 
 
 def test_points_near_the_outline_of_the_part_are_not_used(flat):
