@@ -18,6 +18,7 @@ from inspect3d.compare.measured_map import MeasuredMap
 from inspect3d.job import Job, measured
 from inspect3d.nominal.load import load_nominal
 from inspect3d.nominal.nominal import InspectionMesh, Nominal
+from inspect3d.outcome import InputError
 from inspect3d.progress import Progress
 from inspect3d.recipe import MeasurementTable, Recipe, load_recipe
 from inspect3d.record import InputFile, MeasuredPart, Record
@@ -114,7 +115,22 @@ def _jobs(recipe: Recipe) -> list[Job]:
 def nominal_of(recipe: Recipe) -> Nominal:
     """Return the part of a recipe, its surface and its inspection mesh."""
     part = recipe.part
-    return load_nominal(recipe.cad, name=part.name, units=part.units, element_size=part.element_size, flip=part.flip)
+    nominal = load_nominal(recipe.cad, name=part.name, units=part.units, element_size=part.element_size, flip=part.flip)
+    _require_faces(recipe, nominal)
+    return nominal
+
+
+def _require_faces(recipe: Recipe, nominal: Nominal) -> None:
+    """Refuse numbers of faces that the CAD model does not have."""
+    there = set(np.unique(nominal.mesh.face if nominal.surface_face is None else nominal.surface_face).tolist()) - {-1}
+    named = [("part.regions", recipe.part.regions), ("part.exclude", recipe.part.exclude)]
+    named.append(("part.features", tuple(feature.place for feature in recipe.part.features)))
+    named += [(f"measurements[{table.name!r}].alignment.datum", table.alignment.datum) for table in recipe.measurements]
+    for key, regions in named:
+        missing = sorted({face for region in regions for face in region.faces or ()} - there)
+        if missing:
+            have = f"its faces are 0 to {max(there)}" if there else "it has no faces by number, use boxes"
+            raise InputError(f"{recipe.source.name}: {key}: {recipe.part.cad} has no face {missing[0]}; {have}.")
 
 
 def _warnings(recipe: Recipe, nominal: Nominal) -> tuple[str, ...]:

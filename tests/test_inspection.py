@@ -189,3 +189,20 @@ def test_results_that_cannot_be_written_are_refused_before_anything_is_measured(
         (tmp_path / "locked").mkdir(mode=0o555)
         with pytest.raises(InputError, match="Permission denied"):
             run(recipe(tmp_path), tmp_path / "locked" / "out")
+
+
+@pytest.mark.parametrize(
+    ("there", "instead"),
+    [
+        ("[[measurements]]", "exclude = [ { faces = [9999] } ]\n\n[[measurements]]"),
+        ('units = "mm"\nnoise', 'alignment = { fit = "datum", datum = [ { faces = [9999] } ] }\nunits = "mm"\nnoise'),
+    ],
+)
+def test_a_face_that_the_model_does_not_have_is_refused_before_measuring(tmp_path, there, instead):
+    for name in ("part.step", "scan.ply"):
+        (tmp_path / name).write_bytes((BRACKET / name).read_bytes())
+    text = (BRACKET / "recipe.toml").read_text("utf-8")
+    assert there in text
+    (tmp_path / "recipe.toml").write_text(text.replace(there, instead, 1), encoding="utf-8")
+    with pytest.raises(InputError, match=r"part\.step has no face 9999; its faces are 0 to \d+\."):
+        check(tmp_path / "recipe.toml")

@@ -111,7 +111,9 @@ def _read(file: Path, name: str) -> FinishedMap:
 
     if not file.is_file():
         raise InputError(f"{file} is missing: run the inspection again.")
-    polydata = pyvista.read(file)
+    content = file.read_bytes()  # VTK complains on standard error before it says that it cannot read
+    whole = b"<VTKFile" in content[:200] and content.rstrip().endswith(b"</VTKFile>")
+    polydata = pyvista.read(file) if whole else None
     if not isinstance(polydata, pyvista.PolyData) or polydata.n_points == 0:
         raise InputError(f"{file} is not a map of inspect3d: run the inspection again.")
     fields = {
