@@ -226,6 +226,9 @@ def test_a_pair_is_picked_with_the_keyboard_alone(chromium, photographs, recipe)
             page.locator(".shot canvas").nth(which).focus()
             for key in ("ArrowLeft", "Shift+ArrowUp", "Alt+ArrowRight", "+", "Enter"):
                 page.keyboard.press(key)
+            page.wait_for_function(
+                "which => document.querySelectorAll('.shot .caption')[which].textContent.endsWith(' px')", arg=which
+            )
             place = page.locator(".shot .caption").nth(which).text_content().partition(" · ")[2].removesuffix(" px")
             np.testing.assert_allclose([float(x) for x in place.split(", ")], (304.6, 245.5), atol=0.11)  # as shown
         page.wait_for_selector('body[data-pairs="1"]')

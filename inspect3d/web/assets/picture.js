@@ -94,6 +94,7 @@ export class Picture {
     this.caption.textContent = `${this.info.name}${at}`.replace(/-(?=\d)/g, "\u2212");
   }
   draw() {
+    this.say(); /* at once: words need no frame of their own */
     if (!this.queued) { this.queued = true; requestAnimationFrame(() => { this.queued = false; this.painted(); }); }
   }
   painted() {
@@ -113,7 +114,6 @@ export class Picture {
       this.cross(pen, sx, sy, 9);
       if (this.scale < TIMES * 0.8) this.loupe(pen, sx, sy, w, h);
     }
-    this.say();
   }
   loupe(pen, sx, sy, w, h) {
     const left = sx > w / 2 ? 8 : w - LOUPE - 8, top = sy > h / 2 ? 30 : h - LOUPE - 8, scale = Math.max(TIMES, this.scale * 3);
