@@ -127,6 +127,12 @@ class Scene:
         values[self.position(bending.row.astype(np.int64), bending.col.astype(np.int64))] = bending.data
         return values
 
+    @cached_property
+    def plate_of_motions(self) -> Floats:
+        """Return B'RB (k, k), the plate under the motions of the space, in full."""
+        rows = self.space.rows(self)
+        return np.asarray((rows.T @ (self.matrix(self.plate) @ rows)).toarray())
+
     def matrix(self, values: Floats) -> sparse.csr_matrix:
         """Return a matrix (n, n) with these values in the pattern."""
         n = len(self.nodes)

@@ -149,8 +149,13 @@ def plates(scene: Scene, values: Floats, stiffness: float) -> tuple[Floats, Floa
     stiffness : of the plate, in medians of the diagonal. A millionth of that stays always, to carry nodes that show no
         texture, and a billionth of a ridge
     """
-    stiff_ones = values[scene.diagonal][values[scene.diagonal] > 0]
-    median = float(np.median(stiff_ones)) if len(stiff_ones) else 1.0
+    median = typical(values[scene.diagonal])
     support = SUPPORT * median * scene.plate
     support[scene.diagonal] += RIDGE * median
     return stiffness * median * scene.plate, support
+
+
+def typical(diagonal: Floats) -> float:
+    """Return the median stiffness of the nodes that show texture, from the diagonal (n,) of a nodal matrix."""
+    stiff_ones = diagonal[diagonal > 0]
+    return float(np.median(stiff_ones)) if len(stiff_ones) else 1.0

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.correlation.dense import DenseFactor, cholesky
-from inspect3d.correlation.space import Factored, Matrix, plates
+from inspect3d.correlation.space import RIDGE, SUPPORT, Factored, Matrix, typical
 
 if TYPE_CHECKING:
     from inspect3d.correlation.evaluation import EvaluationPoints
@@ -53,7 +53,7 @@ class SplineSpace:
 
     def motion(self, scene: Scene, deviation: Floats) -> Floats:
         """Return the q that comes nearest to a deviation (n,) mm."""
-        return DenseFactor(cholesky((self.nodes.T @ self.nodes).toarray())).solve(self.nodes.T @ deviation)
+        return DenseFactor(cholesky(self._square)).solve(self.nodes.T @ deviation)
 
     def bent(self, scene: Scene, points: EvaluationPoints, motion: Floats) -> EvaluationPoints:
         """Return the points moved along the normals from the facets to the cubics."""
@@ -79,11 +79,10 @@ class SplineSpace:
         """Return full matrices."""
         f = len(blocks)
         spread = sparse.bsr_matrix((blocks, np.arange(f), np.arange(f + 1)), shape=(3 * f, 3 * f))
-        plate, support = (
-            _congruent(scene.matrix(values), self._packed[0])
-            for values in plates(scene, scene.assembled(blocks), stiffness)
-        )
-        return _congruent(spread, self._packed[1]) + plate + support, plate
+        median = typical(scene.gathered(np.einsum("fii->fi", blocks)))
+        plate = stiffness * median * scene.plate_of_motions
+        support = median * (SUPPORT * scene.plate_of_motions + RIDGE * self._square)
+        return _congruent(spread, self._packed) + plate + support, plate
 
     def factored(self, scene: Scene, matrix: Matrix) -> DenseFactor:
         """Return the full factor."""
@@ -123,12 +122,15 @@ class SplineSpace:
         return (sparse.kron(sparse.identity(facets), fit, format="csr") @ self.samples).tocsr()
 
     @cached_property
-    def _packed(self) -> tuple[Matrix, Matrix]:
-        """Return B and the corners of the planes, in full where that is quicker to multiply."""
-        nodes, corners = (
-            rows.toarray() if rows.nnz > FILLED * np.prod(rows.shape) else rows for rows in (self.nodes, self._corners)
-        )
-        return nodes, corners
+    def _packed(self) -> Matrix:
+        """Return the corners of the planes, in full where that is quicker to multiply."""
+        corners = self._corners
+        return corners.toarray() if corners.nnz > FILLED * np.prod(corners.shape) else corners
+
+    @cached_property
+    def _square(self) -> Floats:
+        """Return B'B."""
+        return (self.nodes.T @ self.nodes).toarray()
 
 
 def _congruent(matrix: sparse.csr_matrix, rows: Matrix) -> Floats:

@@ -18,6 +18,8 @@ from inspect3d.nominal.nurbs_face import nurbs_of
 from inspect3d.outcome import InputError, MeasurementError
 
 ENOUGH = 1.5  # nodes for each control point, at the least
+NEAR = 1e-4  # mm; the next step would be far shorter
+FAR = 10.0  # times the median distance from the surface
 
 
 @dataclass(frozen=True)
@@ -114,11 +116,27 @@ class _Attached:
     def space(self) -> SplineSpace:
         """Return the motions of the nodes that the control points allow."""
         scene, shapes = self.scene, sample_points()
-        samples = np.einsum("si,fid->fsd", shapes, scene.nodes[scene.triangles]).reshape(-1, 3)
-        normals = unit(np.einsum("si,fid->fsd", shapes, scene.normals[scene.triangles]).reshape(-1, 3))
+        total = sum(patch.size for patch in self.patches.values())
+        samples = np.einsum("si,fid->fsd", shapes, scene.nodes[scene.triangles])
+        normals = unit(np.einsum("si,fid->fsd", shapes, scene.normals[scene.triangles]))
+        of_nodes, of_samples = [], []
+        order_of_nodes, order_of_facets = [], []
+        first = 0
+        for number, patch in self.patches.items():
+            facets = np.flatnonzero(self.face == number)
+            nodes, corners = np.unique(scene.triangles[facets], return_inverse=True)
+            uv = patch.parameters(scene.nodes[nodes])
+            own = np.flatnonzero(self._node_face[nodes] == number)
+            of_nodes.append(_rows(patch, uv[own], scene.normals[nodes[own]], first, total))
+            order_of_nodes.append(nodes[own])
+            guess = np.einsum("si,fid->fsd", shapes, uv[corners.reshape(-1, 3)]).reshape(-1, 2)
+            uv = _near(patch, samples[facets].reshape(-1, 3), guess)
+            of_samples.append(_rows(patch, uv, normals[facets].reshape(-1, 3), first, total))
+            order_of_facets.append(facets)
+            first += patch.size
         return SplineSpace(
-            self._rows(scene.nodes, scene.normals, self._node_face),
-            self._rows(samples, normals, np.repeat(self.face, len(shapes))),
+            _sorted(of_nodes, order_of_nodes, 1),
+            _sorted(of_samples, order_of_facets, len(shapes)),
             tuple(self.patches.values()),
         )
 
@@ -129,18 +147,31 @@ class _Attached:
         np.minimum.at(face, self.scene.triangles.ravel(), np.repeat(self.face, 3))
         return face
 
-    def _rows(self, points: Floats, normals: Floats, face: Integers) -> sparse.csr_matrix:
-        """Return how far each control point's motion along its normal moves points of the part along theirs, (p, k)."""
-        blocks, order = [], []
-        first, total = 0, sum(patch.size for patch in self.patches.values())
-        for number, patch in self.patches.items():
-            members = np.flatnonzero(face == number)
-            functions = patch.functions(patch.parameters(points[members])).tocoo()
-            towards = (patch.directions[functions.col] * normals[members][functions.row]).sum(axis=1)
-            moved = sparse.coo_matrix(
-                (functions.data * towards, (functions.row, functions.col + first)), shape=(len(members), total)
-            )
-            blocks.append(moved.tocsr())
-            order.append(members)
-            first += patch.size
-        return sparse.vstack(blocks, format="csr")[np.argsort(np.concatenate(order))]
+
+def _sorted(blocks: list[sparse.csr_matrix], orders: list[Integers], each: int) -> sparse.csr_matrix:
+    """Return blocks, with `each` rows for every number in their orders, as one matrix in the order of the numbers."""
+    if len(blocks) == 1:
+        return blocks[0]
+    order = np.argsort(np.concatenate(orders))
+    return sparse.vstack(blocks, format="csr")[(order[:, None] * each + np.arange(each)).ravel()]
+
+
+def _near(patch: Nurbs, points: Floats, guess: Floats) -> Floats:
+    """Return the parameters (p, 2) of points (p, 3) mm near the surface, from a guess that seams may have spoilt."""
+    uv = patch.descended(points, guess, NEAR)
+    low, high = patch.bounds
+    away = np.linalg.norm(patch.points(uv) - points, axis=1)
+    doubted = ((uv <= low) | (uv >= high)).any(axis=1) | (away > FAR * np.median(away))
+    uv[doubted] = patch.parameters(points[doubted])
+    return uv
+
+
+def _rows(patch: Nurbs, uv: Floats, normals: Floats, first: int, total: int) -> sparse.csr_matrix:
+    """Return how far each control point's motion along its normal moves places (p,) along theirs, (p, total).
+
+    Parameters
+    ----------
+    first : column of the patch's first control point
+    """
+    rows = patch.along(uv, normals)
+    return sparse.csr_matrix((rows.data, rows.indices + first, rows.indptr), shape=(len(uv), total))

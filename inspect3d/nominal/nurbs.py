@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from inspect3d.arrays import Floats, floats, unit
+from inspect3d.arrays import Floats, Integers, floats, unit
 from inspect3d.pose import Pose
 
 STEPS, ARRIVED = 30, 1e-10  # mm
 AROUND = 8  # places near a point to start from where it ends at the rim
 PLACES = 6  # along each direction of a span between knots, to start the search for a point from
-SINGULAR = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +30,7 @@ class Nurbs:
 
     Notes
     -----
-    L. Piegl, W. Tiller, The NURBS Book, 2nd edition, Springer, 1997. The B-splines N are SciPy's.
+    L. Piegl, W. Tiller, The NURBS Book, 2nd edition, Springer, 1997.
     """
 
     poles: Floats
@@ -69,21 +68,27 @@ class Nurbs:
 
     def functions(self, uv: Floats) -> sparse.csr_matrix:
         """Return R (n, a b), what each control point weighs at parameters (n, 2); rows add up to one."""
-        product = self._products(uv)[0]
-        product.data /= np.repeat(np.asarray(product.sum(axis=1)).ravel(), np.diff(product.indptr))
-        return product
+        return self._spread(*self._weighed(uv))
+
+    def along(self, uv: Floats, towards: Floats) -> sparse.csr_matrix:
+        """Return how far a motion of each control point along its normal moves places along directions (n, 3)."""
+        from inspect3d.nominal.nurbs_kernel import turn_towards
+
+        columns, values = self._weighed(uv)
+        turn_towards(columns, self.directions, np.ascontiguousarray(towards), values)
+        return self._spread(columns, values)
 
     def points(self, uv: Floats) -> Floats:
         """Return S (n, 3) mm."""
-        return self.functions(uv) @ self.poles.reshape(-1, 3)
+        return self.tangents(uv)[0]
 
     def tangents(self, uv: Floats) -> tuple[Floats, Floats, Floats]:
         """Return S, dS/du and dS/dv, (n, 3) mm each."""
-        homogeneous = np.column_stack([self.poles.reshape(-1, 3), np.ones(self.size)])
-        value, along_u, along_v = (product @ homogeneous for product in self._products(uv, slopes=True))
-        weight = value[:, 3:]
-        points = value[:, :3] / weight
-        return points, *((slope[:, :3] - points * slope[:, 3:]) / weight for slope in (along_u, along_v))
+        from inspect3d.nominal.nurbs_kernel import write_places
+
+        found = np.empty((len(uv), 9))
+        write_places(self._net, *self.degrees, self._within(uv), found)
+        return found[:, :3].copy(), found[:, 3:6].copy(), found[:, 6:].copy()
 
     def normals(self, uv: Floats) -> Floats:
         """Return the outward normals (n, 3), unit; at a pole, where a derivative vanishes, those a little inside."""
@@ -104,32 +109,24 @@ class Nurbs:
         What ends there may belong beyond a seam, and is sought from other places near by as well.
         """
         tree, places = self._places
-        _, nearest = tree.query(points, k=min(AROUND, len(places)))
-        uv = self._descended(points, places[nearest[:, 0]])
+        uv = self.descended(points, places[tree.query(points)[1]])
         low, high = self.bounds
         at_rim = np.flatnonzero(((uv <= low) | (uv >= high)).any(axis=1))
         distance = np.linalg.norm(self.points(uv[at_rim]) - points[at_rim], axis=1)
-        for other in nearest[at_rim, 1:].T:
-            tried = self._descended(points[at_rim], places[other])
+        _, nearest = tree.query(points[at_rim], k=min(AROUND, len(places)))
+        for other in nearest.T[1:]:
+            tried = self.descended(points[at_rim], places[other])
             away = np.linalg.norm(self.points(tried) - points[at_rim], axis=1)
             closer = away < distance
             uv[at_rim[closer]], distance[closer] = tried[closer], away[closer]
         return uv
 
-    def _descended(self, points: Floats, guess: Floats) -> Floats:
-        """Return the parameters (n, 2) that Gauss-Newton leads to from a guess."""
-        uv, (low, high) = guess.copy(), self.bounds
-        active = np.arange(len(points))
-        for _ in range(STEPS):
-            at, along_u, along_v = self.tangents(uv[active])
-            step = _tangential(points[active] - at, along_u, along_v)
-            moved = np.clip(uv[active] + step, low, high)
-            change = np.abs(moved - uv[active])
-            uv[active] = moved
-            lengths = np.linalg.norm(along_u, axis=1) * change[:, 0] + np.linalg.norm(along_v, axis=1) * change[:, 1]
-            active = active[lengths > ARRIVED]
-            if not len(active):
-                break
+    def descended(self, points: Floats, guess: Floats, arrived: float = ARRIVED) -> Floats:
+        """Return the parameters (n, 2) that Gauss-Newton leads to from a guess; its last step is `arrived` mm long."""
+        from inspect3d.nominal.nurbs_kernel import descend
+
+        uv = self._within(guess).copy()
+        descend(self._net, *self.degrees, np.ascontiguousarray(points), STEPS, arrived, uv)
         return uv
 
     @cached_property
@@ -167,62 +164,25 @@ class Nurbs:
         """Return the surface grown about the origin by a scale, and then moved by a pose."""
         return replace(self, poles=pose(scale * self.poles.reshape(-1, 3)).reshape(self.poles.shape))
 
-    def _products(self, uv: Floats, slopes: bool = False) -> list[sparse.csr_matrix]:
-        """Return w N_i N_j (n, a b) and, for `slopes`, its derivatives by u and v."""
+    def _weighed(self, uv: Floats) -> tuple[Integers, Floats]:
+        """Return which control points weigh at parameters (n, 2), and how much, (n, (p + 1) (q + 1))."""
+        from inspect3d.nominal.nurbs_kernel import write_functions
+
+        p, q = self.degrees
+        shape = (len(uv), (p + 1) * (q + 1))
+        columns, values = np.empty(shape, dtype=np.int64), np.empty(shape)
+        write_functions(self._net, p, q, self._within(uv), columns, values)
+        return columns, values
+
+    def _spread(self, columns: Integers, values: Floats) -> sparse.csr_matrix:
+        starts = np.arange(len(values) + 1) * values.shape[1]
+        return sparse.csr_matrix((values.ravel(), columns.ravel(), starts), shape=(len(values), self.size))
+
+    @property
+    def _net(self) -> tuple[Floats, Floats, Floats, Floats]:
+        return self.poles, self.weights, self.knots_u, self.knots_v
+
+    def _within(self, uv: Floats) -> Floats:
+        """Return parameters (n, 2) with those beyond the bounds brought to them."""
         low, high = self.bounds
-        within = np.clip(uv, low, high)
-        both = [
-            _functions(knots, degree, within[:, axis], slopes)
-            for axis, (knots, degree) in enumerate(zip((self.knots_u, self.knots_v), self.degrees, strict=True))
-        ]
-        found = [_rowwise(both[0][0], both[1][0])]
-        if slopes:
-            found += [_rowwise(both[0][1], both[1][0]), _rowwise(both[0][0], both[1][1])]
-        for product in found:
-            product.data *= self.weights.ravel()[product.indices]
-        return found
-
-
-def _tangential(r: Floats, along_u: Floats, along_v: Floats) -> Floats:
-    """Return the step (n, 2) that leads along the tangents by r (n, 3); at a pole along each by itself."""
-    e, f, g = ((a * b).sum(axis=1) for a, b in ((along_u, along_u), (along_u, along_v), (along_v, along_v)))
-    right_u, right_v = (r * along_u).sum(axis=1), (r * along_v).sum(axis=1)
-    regular = e * g - f * f > SINGULAR * e * g
-    f = np.where(regular, f, 0.0)
-    over = np.divide(1.0, e * g - f * f, out=np.zeros(len(r)), where=e * g - f * f > 0)
-    return np.stack([over * (g * right_u - f * right_v), over * (e * right_v - f * right_u)], axis=1)
-
-
-def _functions(knots: Floats, degree: int, at: Floats, slopes: bool) -> list[sparse.csr_matrix]:
-    """Return the B-splines of one direction at parameters (n,), and their slopes."""
-    count = len(knots) - degree - 1
-    found = [_splines(knots, degree, at)]
-    if slopes:
-        lower = _splines(knots[1:-1], degree - 1, at)
-        width = knots[degree + 1 : degree + count] - knots[1:count]
-        steps = np.divide(degree, width, out=np.zeros(count - 1), where=width > 0)
-        difference = sparse.diags([-steps, steps], [0, 1], shape=(count - 1, count))
-        found.append(lower @ difference)
-    return found
-
-
-def _splines(knots: Floats, degree: int, at: Floats) -> sparse.csr_matrix:
-    from scipy.interpolate import BSpline
-
-    if not len(at):
-        return sparse.csr_matrix((0, len(knots) - degree - 1))
-    return sparse.csr_matrix(BSpline.design_matrix(at, knots, degree))
-
-
-def _rowwise(one: sparse.csr_matrix, other: sparse.csr_matrix) -> sparse.csr_matrix:
-    """Return the products (n, a b) of all entries of a row (n, a) with all entries of the same row (n, b)."""
-    one, other = one.tocsr(), other.tocsr()
-    counts, others = np.diff(one.indptr), np.diff(other.indptr)
-    rows = np.repeat(np.arange(one.shape[0]), counts)  # of every entry of `one`
-    each = others[rows]
-    first = np.repeat(np.arange(len(rows)), each)
-    second = np.arange(each.sum()) - np.repeat(np.cumsum(each) - each, each) + np.repeat(other.indptr[rows], each)
-    data = one.data[first] * other.data[second]
-    columns = one.indices[first].astype(np.int64) * other.shape[1] + other.indices[second]
-    starts = np.concatenate([[0], np.cumsum(counts * others)])
-    return sparse.csr_matrix((data, columns, starts), shape=(one.shape[0], one.shape[1] * other.shape[1]))
+        return np.ascontiguousarray(np.clip(uv, low, high))
