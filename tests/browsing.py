@@ -31,6 +31,12 @@ REFUSED = "the server responded with a status of 422"
 PATIENCE = 60_000  # ms
 
 
+def drawn(page: Any) -> None:
+    """Wait until what the page shows has come to rest and is drawn, however slow the machine."""
+    page.wait_for_timeout(250)
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
 @contextmanager
 def serving(page: Page) -> Iterator[PageServer]:
     """Serve a page on a free port while the block runs."""

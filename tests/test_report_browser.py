@@ -18,6 +18,7 @@ from inspect3d.report.pictures import Shown
 from inspect3d.report.results import results
 from inspect3d.report.viewer import viewer_data
 from inspect3d.report.viewpoint import Viewpoint
+from tests.browsing import drawn
 
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
 FLAGS = ["--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
@@ -57,7 +58,7 @@ def _local(address):
 
 def pictures(tab):
     """Return what each view shows, (height, width, 3)."""
-    tab.wait_for_timeout(400)
+    drawn(tab)
     found = tab.evaluate("[...document.querySelectorAll('#viewer canvas')].map((canvas) => canvas.toDataURL())")
     images = [Image.open(io.BytesIO(base64.b64decode(each.split(",")[1]))) for each in found]
     return [np.asarray(image.convert("RGB")).astype(int) for image in images]
@@ -115,10 +116,10 @@ def test_a_view_can_show_the_difference_of_two_methods_and_its_en(opened):
 def test_resting_on_the_part_reads_the_value_in_every_view(opened):
     tab, _ = opened
     tab.click("#viewer [data-view='0 0 1']")
-    tab.wait_for_timeout(400)
+    drawn(tab)
     box = tab.locator("#viewer canvas").first.bounding_box()
     tab.mouse.move(box["x"] + box["width"] / 2 + 8, box["y"] + box["height"] / 2 + 8)
-    tab.wait_for_timeout(400)
+    drawn(tab)
     words = tab.locator("#viewer .probe").all_inner_texts()
     assert len(words) == 3
     assert all(re.search(r"[+−]?0\.\d+ ± 0\.\d+ mm", each) for each in words), words

@@ -21,7 +21,7 @@ from inspect3d.register.landmarks import pose_from_landmarks
 from inspect3d.virtual.stereo_datasets import knowing, milled_stereo
 from inspect3d.virtual.stereo_rig import StereoRig
 from inspect3d.web.pick_page import pick_of
-from tests.browsing import browser, opened, serving
+from tests.browsing import browser, drawn, opened, serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -143,7 +143,7 @@ def click_in_picture(page, which: int, pixel: np.ndarray, size: tuple[int, int])
     near = np.round([left + (pixel[0] + 0.5) * scale, top + (pixel[1] + 0.5) * scale])
     page.mouse.move(*near)
     page.mouse.wheel(0, -np.log(ENLARGED) / 0.0015)
-    page.wait_for_timeout(100)
+    drawn(page)
     under = (near - [left, top]) / scale - 0.5
     at = np.round(near + (pixel - under) * scale * ENLARGED)
     page.mouse.click(*at)

@@ -23,7 +23,7 @@ from inspect3d.report.maps import map_polydata
 from inspect3d.report.results import as_json, results
 from inspect3d.web.notebook import Results
 from inspect3d.web.view_page import view_of
-from tests.browsing import browser, opened, serving
+from tests.browsing import browser, drawn, opened, serving
 from tests.test_report import NASTY, a_record
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -92,7 +92,7 @@ def page(chromium, out):
 
 def picture_of(page, which: int) -> np.ndarray:
     """Return what a map shows, (rows, columns, 3)."""
-    page.wait_for_timeout(400)
+    drawn(page)
     shot = page.locator(".map canvas").nth(which).screenshot()
     return cv2.imdecode(np.frombuffer(shot, np.uint8), cv2.IMREAD_COLOR).astype(float)
 
