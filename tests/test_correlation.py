@@ -208,6 +208,16 @@ def test_nodes_under_a_stain_are_not_observed_and_the_others_are_right(nominal, 
     assert np.abs(error).max() < 0.025
 
 
+def test_a_node_of_an_edge_that_belongs_to_a_face_out_of_sight_is_not_observed(nominal, views, known):
+    seen = np.flatnonzero(known.observed)
+    node = seen[np.argmin(nominal.mesh.nodes[seen, 1])]
+    normals = nominal.mesh.normals.copy()
+    normals[node] = [0.0, -1.0, 0.0]
+    shape = Correlate()(replace(nominal, mesh=replace(nominal.mesh, normals=normals)), pictures(views), views)
+    assert not shape.observed[node]
+    assert shape.observed[seen].sum() == len(seen) - 1
+
+
 def test_a_smooth_shift_of_the_pictures_is_in_the_claim_that_states_it(nominal, views):
     grey, stated = pictures(views), Systematic(size=0.035, length=15.0)
     rows, columns = np.mgrid[: grey[0].shape[0], : grey[0].shape[1]]

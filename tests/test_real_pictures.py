@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import pyvista as pv
+from matplotlib.tri import LinearTriInterpolator, Triangulation
 from scipy.optimize import least_squares
 
 from inspect3d.camera import Camera, View
@@ -26,9 +27,10 @@ MULTIDIC = CameraSigma(0.5, 1.0, np.array([3e-3, 1e-2, 2e-4, 2e-4, 1e-2]), rotat
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A finished measurement: its part of the record, and the measured points (n, 3) mm of the observed nodes."""
+    """A finished measurement: its part of the record, the mesh, and the measured points (n, 3) mm of observed nodes."""
 
     part: object
+    mesh: object
     points: np.ndarray
     seen: int
 
@@ -59,7 +61,7 @@ alignment = {alignment}
     assert part.status.has_map, part.reason
     mesh, seen = record.nominal.mesh, part.deviation.observed
     points = mesh.nodes[seen] + part.deviation.value[seen, None] * mesh.normals[seen]
-    return Measured(part, points, int(np.isfinite(part.residual).sum()))
+    return Measured(part, mesh, points, int(np.isfinite(part.residual).sum()))
 
 
 def written(path, points, shape):
@@ -181,12 +183,33 @@ def test_frames_repeat_within_what_is_claimed(frames):
         assert np.mean(np.abs(ratio) < 1.96) > 0.95
 
 
-def test_a_nominal_radius_three_tenths_off_leads_to_the_same_radius(multidic, frames):
+def radii(frame, nominal, angle, z):
+    """Return the measured radius, mm, about the axis of a nominal radius, at angles and heights; masked where unseen.
+
+    Nodes move along the radius, and elements are linear in between.
+    """
+    mesh, deviation = frame.mesh, frame.part.deviation
+    kept = mesh.triangles[deviation.observed[mesh.triangles].all(axis=1)]
+    along = nominal * np.arctan2(mesh.nodes[:, 1], mesh.nodes[:, 0])
+    values = nominal + np.where(deviation.observed, deviation.value, 0.0)
+    return LinearTriInterpolator(Triangulation(along, mesh.nodes[:, 2], kept), values)(nominal * angle, z)
+
+
+def test_nominal_radii_three_tenths_off_lead_to_the_same_surface(multidic, frames):
+    angle, z = np.meshgrid(np.radians(np.arange(45.0, 135.0, 0.5)), np.arange(15.0, 235.0, 0.5), indexing="ij")
     radius, _ = fitted_radius(frames[0].points)
+    expected = radii(frames[0], 57.0, angle, z)
     for off in (56.7, 57.3):
-        found, residual = fitted_radius(multidic(1, off).points)
-        assert found == pytest.approx(radius, abs=0.1)
-        assert np.sqrt(np.mean(residual**2)) < 0.020
+        frame = multidic(1, off)
+        assert fitted_radius(frame.points)[0] == pytest.approx(radius, abs=0.1)
+        apart = radii(frame, off, angle, z) - expected
+        both = ~np.ma.getmaskarray(apart)
+        assert both.mean() > 0.6
+        c, s, height = np.cos(angle[both]), np.sin(angle[both]), z[both] - 125.0
+        shifts_and_tilts = np.stack([c, s, height * c, height * s], axis=1)
+        apart = np.asarray(apart[both])
+        apart -= shifts_and_tilts @ np.linalg.lstsq(shifts_and_tilts, apart, rcond=None)[0]
+        assert np.sqrt(np.mean(apart**2)) < 0.005
 
 
 def flatness(points):

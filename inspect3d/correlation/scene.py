@@ -9,13 +9,14 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from inspect3d.arrays import Booleans, Floats, Integers
+from inspect3d.arrays import Booleans, Floats, Integers, unit
 from inspect3d.camera import View
 from inspect3d.correlation.evaluation import EvaluationPoints, evaluation_points, points_per_edge
 from inspect3d.correlation.factor import Ordering
 from inspect3d.correlation.space import EVERY_NODE, Space
 from inspect3d.correlation.visibility import visibility
 from inspect3d.nominal.nominal import Nominal
+from inspect3d.nominal.remeshing import FEATURE_ANGLE
 from inspect3d.outcome import MeasurementError
 
 FEWEST = 6
@@ -63,6 +64,17 @@ class Scene:
     def whole(self) -> Booleans:
         """Tell around which nodes at least half of the evaluation points count, (n,)."""
         return self.share >= WHOLE
+
+    @cached_property
+    def upright(self) -> Booleans:
+        """Tell which nodes move across the facets that are seen around them, within 30 degrees, (n,).
+
+        A node of a sharp edge may belong to a face beside these facets. Its motion slides them along themselves, which
+        says nothing about the face that it belongs to.
+        """
+        a, b, c = (self.nodes[self.triangles[:, k]] for k in range(3))
+        across = unit(self.gathered(np.repeat(np.cross(b - a, c - a)[:, None], 3, axis=1)))
+        return np.asarray((across * self.normals).sum(axis=1) >= np.cos(FEATURE_ANGLE))
 
     @cached_property
     def extent(self) -> float:

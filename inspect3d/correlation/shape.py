@@ -63,9 +63,10 @@ class Shape:
     def sound(self) -> Booleans:
         """Tell which nodes of the scene count as observed, (n,).
 
-        Those with at least half their evaluation points in facets on which the pictures agree, and off creases.
+        Those with at least half their evaluation points in facets on which the pictures agree, off creases, and that
+        move across these facets.
         """
-        return self.scene.whole & ~self.mesh.crease[self.scene.node]
+        return self.scene.whole & self.scene.upright & ~self.mesh.crease[self.scene.node]
 
     @property
     def observed(self) -> Booleans:
