@@ -10,6 +10,8 @@ from inspect3d.measure import Files, NodalMeasurement
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.recipe_alignment import Start
 
+SMOOTHEST = 0.1  # beyond, the plate takes off more of a curved shape than the uncertainty can tell
+
 
 @dataclass(frozen=True)
 class Stereocorrelation:
@@ -25,6 +27,8 @@ class Stereocorrelation:
     steepest : degrees, largest angle between a normal and the line of sight
     systematic : px, standard uncertainty of a smooth shift of each picture that no model explains
     systematic_length : mm on the part, over which that shift stays alike; None: an eighth of the part
+    smoothing : stiffness of a plate that smooths the map when it has been found, in medians of the nodes' own, up to
+        0.1; 0: the map as it was measured
     alignment : where the part starts before a known rig, and whether its place is refined
     """
 
@@ -36,9 +40,12 @@ class Stereocorrelation:
     steepest: float = 65.0
     systematic: float = 0.01
     systematic_length: float | None = None
+    smoothing: float = 0.0
     alignment: Start = field(default=Start(), repr=False)
 
     def __post_init__(self) -> None:
+        if not 0 <= self.smoothing <= SMOOTHEST:
+            raise ValueError(f"smoothing = {self.smoothing:g} is not between 0 and {SMOOTHEST:g}")
         _ = self._stereo
 
     def open(self, files: Files) -> StereoSource:
@@ -59,7 +66,8 @@ class Stereocorrelation:
         MeasurementError
             The landmarks do not fit, the pictures do not show the part twice, or they do not agree.
         """
-        correlate = replace(self._stereo.correlate(nominal), lifted=self.facets == "lifted")
+        own = self._stereo.correlate(nominal)
+        correlate = replace(own, lifted=self.facets == "lifted", smoothing=self.smoothing)
         return self._stereo(source, nominal, correlate)
 
     @property

@@ -127,3 +127,27 @@ def test_self_calibrated_the_rest_and_the_weak_motions_are_as_large_as_claimed(n
     assert 0.9 < rms(together) < 1.1
     assert 0.93 < (np.abs(together) < 1.96).mean() < 0.97
     assert chi2.ppf(0.001, modes) < distance < chi2.ppf(0.99, modes)
+
+
+def test_a_smoothed_map_is_quieter_and_its_claim_counts_what_was_taken_off(nominal, exact):
+    errors, ratios = [], []
+    for seed in range(3):
+        grey = photographs(exact, np.random.default_rng(seed))
+        plain, smooth = (Correlate(pixels=4.0, smoothing=k)(nominal, grey, exact[0]) for k in (0.0, 0.1))
+        truth, sound = bump(*smooth.scene.nodes[:, :2].T), smooth.sound
+        assert np.array_equal(plain.state.motion, smooth.state.motion)
+        errors.append([rms((shape.values - truth)[sound]) for shape in (plain, smooth)])
+        ratios.append(((smooth.values - truth) / np.sqrt(smooth.uncertainty.variances))[sound])
+    without_plate, with_plate = np.mean(errors, axis=0)
+    assert with_plate < 0.9 * without_plate
+    z = np.concatenate(ratios)
+    assert 0.85 < rms(z) < 1.1
+    assert (np.abs(z) < 1.96).mean() > 0.93
+
+
+def test_the_claim_of_a_smoothed_map_is_the_diagonal_of_its_covariance(nominal, exact):
+    views, grey = exact[0], photographs(exact, np.random.default_rng(0))
+    freedom = Freedom("free", (LENS, LENS), views, nominal.mesh.nodes.mean(axis=0))
+    shape = Correlate(pixels=4.0, smoothing=0.1)(nominal, grey, views, freedom)
+    diagonal = np.diag(shape.uncertainty.covariance(np.eye(len(shape.scene.nodes))))
+    assert shape.uncertainty.variances == pytest.approx(diagonal, rel=1e-5)

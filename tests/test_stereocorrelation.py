@@ -130,6 +130,14 @@ def placed(folder):
     return part, nominal, folder / "placed"
 
 
+def test_a_map_that_is_smoothed_is_called_so(folder):
+    found, _ = inspected(folder, 'cameras = "placed.json"\nsmoothing = 0.1')
+    assert found.remarks[0].startswith("This map is smoothed (smoothing = 0.1), by ")
+    assert "smoothing" in [source for source, _, _ in found.contributions]
+    with pytest.raises(InputError, match=r"smoothing = 0\.3 is not between 0 and 0\.1"):
+        check(recipe(folder, 'cameras = "placed.json"\nsmoothing = 0.3'))
+
+
 def test_the_bump_is_found_with_a_true_uncertainty(placed):
     part, nominal, _ = placed
     error, z = errors(part, nominal)

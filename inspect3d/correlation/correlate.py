@@ -57,6 +57,7 @@ class Correlate:
     poorest : least correlation coefficient of a facet that counts
     systematic : a smooth systematic shift of the pictures, carried into the uncertainty; where the pictures disagree by
         more than it explains, by as much as they do
+    smoothing : stiffness of a plate that smooths the map when it has been found, in medians of the nodes' own; 0: none
     splines : nodes move as the control points of the CAD's own NURBS faces have it; none: each by itself
     """
 
@@ -68,6 +69,7 @@ class Correlate:
     steepest: float = 65.0
     poorest: float = 0.7
     systematic: Systematic | None = None
+    smoothing: float = 0.0
     splines: Splines | None = None
 
     def __call__(
@@ -132,6 +134,8 @@ class Correlate:
         if last.poses != "known" and not seen.space.confined:
             found_views, deviation = in_gauge(seen, last, state.views, state.deviation)
             state = replace(state, views=found_views, motion=deviation, deviation=deviation)
+        if self.smoothing > 0:
+            sure = sure.smoothed(seen, found, state.weights, state.motion, self.smoothing)
         return Shape(nominal.mesh, seen, state, sure, motions, found, calibrated, systematic)
 
     def _scene(self, nominal: Nominal, views: Sequence[View], masks: Sequence[Booleans | None] | None) -> Scene:

@@ -56,8 +56,8 @@ class Shape:
 
     @cached_property
     def values(self) -> Floats:
-        """Return the deviation of the scene's nodes, (n,) mm, smoothed against the bias of linear elements."""
-        return self.uncertainty.smoother @ self.state.motion
+        """Return the deviation of the scene's nodes, (n,) mm, without the bias of linear elements."""
+        return self.uncertainty.deviation(self.state.motion)
 
     @cached_property
     def sound(self) -> Booleans:

@@ -114,10 +114,12 @@ class System:
 
     def variances(self, rows: sparse.csr_matrix) -> Floats:
         """Return the diagonal of T C T' for the covariance C of the motions; each row of T is of a few neighbours."""
-        solved, inverse = self.held
-        held, following = rows @ solved, rows @ self.following
+        return self.motion.quadratic(rows) + self.beyond(rows @ self.held[0], rows @ self.following)
+
+    def beyond(self, held: Floats, following: Floats) -> Floats:
+        """Return what gauge and cameras add to the diagonal of T K⁻¹ T', from T K⁻¹C (n, g) and T X (n, m)."""
         by_cameras = np.einsum("ij,jk,ik->i", following, self.camera_covariance, following)
-        return self.motion.quadratic(rows) - np.einsum("ij,jk,ik->i", held, inverse, held) + by_cameras
+        return by_cameras - np.einsum("ij,jk,ik->i", held, self.held[1], held)
 
     def covariance(self, columns: Floats) -> Floats:
         """Return C times columns (n, k)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +17,7 @@ from inspect3d.correlation.linear import noise_of, slides_of, system_of
 from inspect3d.correlation.misfit import misfit, unresolved
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.scene import Scene
+from inspect3d.correlation.smoothing import Smoothing
 from inspect3d.correlation.system import System
 
 SHIFT_X, SHIFT_Y = 8, 9
@@ -39,16 +40,20 @@ class Systematic:
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """The covariance T (C + F F') T' + diag(m²) of the smoothed deviation of the scene's nodes, in mm².
+    """The covariance T (C + F F') T' + diag(m²) of the reported deviation of the scene's nodes, in mm².
+
+    Where the map is smoothed the motions are S q, see `Smoothing`; C and F are S C S' and S F then.
 
     Parameters
     ----------
     system : the information of the pictures and priors; its inverse is C
     shifts : F (k, r), the response of the shape to the systematic field
     smoother : T (n, k), from the motions of the scene's space to the deviation of its nodes
-    rough : m (n,) mm, of nodes where the elements do not fit, as at a step, or splines miss the part; 0 elsewhere
+    rough : m (n,) mm, of nodes where the elements do not fit, as at a step, or splines miss the part; 0 elsewhere. Of a
+        smoothed map the bias too
     noise : variance of the residuals where they fit, grey levels²
     correlated : κ >= 1, by which the residuals of neighbouring points add up to more than if they were independent
+    smoothing : S, of a map that is smoothed
     """
 
     system: System
@@ -57,17 +62,36 @@ class Uncertainty:
     rough: Floats
     noise: float
     correlated: float
+    smoothing: Smoothing | None = None
+
+    def deviation(self, motion: Floats) -> Floats:
+        """Return the deviation (n,) mm to be reported of a motion (k,)."""
+        return self.smoother @ (motion if self.smoothing is None else self.smoothing(motion))
+
+    def smoothed(self, scene: Scene, found: Facets, weights: Floats, motion: Floats, stiffness: float) -> Uncertainty:
+        """Return the uncertainty of the map smoothed by a plate.
+
+        Parameters
+        ----------
+        found, weights : as for `uncertainty`
+        motion : (k,) mm, found without the plate
+        stiffness : see `Smoothing`
+        """
+        shares = weights * found.clean**2 / (self.noise * self.correlated)
+        smoothing = Smoothing(scene, found.node * shares[:, None, None], self.system, stiffness)
+        bias = self.smoother @ smoothing.taken(motion)
+        return replace(self, shifts=smoothing(self.shifts), rough=np.hypot(self.rough, bias), smoothing=smoothing)
 
     @cached_property
     def variances(self) -> Floats:
         """Return the diagonal, (n,) mm²."""
         by_shifts = ((self.smoother @ self.shifts) ** 2).sum(axis=1)
-        return self.system.variances(self.smoother) + by_shifts + self.rough**2
+        return self._motions.variances(self.smoother) + by_shifts + self.rough**2
 
     def covariance(self, columns: Floats) -> Floats:
         """Return the covariance times columns (n, k)."""
         back = self.smoother.T @ columns
-        smooth = self.smoother @ (self.system.covariance(back) + self.shifts @ (self.shifts.T @ back))
+        smooth = self.smoother @ (self._motions.covariance(back) + self.shifts @ (self.shifts.T @ back))
         return smooth + (self.rough**2)[:, None] * columns
 
     def variances_without(self, modes: Floats, solver: Floats) -> Floats:
@@ -75,6 +99,10 @@ class Uncertainty:
         crossed = self.covariance(np.ascontiguousarray(solver.T))
         between = np.einsum("ij,jk,ik->i", modes, solver @ crossed, modes)
         return self.variances - 2 * np.einsum("ij,ij->i", modes, crossed) + between
+
+    @property
+    def _motions(self) -> System | Smoothing:
+        return self.smoothing or self.system
 
 
 def needed_columns(freedom: Freedom, systematic: Systematic | None) -> Integers:
