@@ -44,6 +44,7 @@ METHODS = {
     "CAD's knots": Correlate(pixels=PIXELS, splines=Splines()),
     "halved once": Correlate(pixels=PIXELS, splines=Splines(refine=1)),
     "halved twice": Correlate(pixels=PIXELS, splines=Splines(refine=2)),
+    "CAD's knots, apart": Correlate(pixels=PIXELS, splines=Splines(continuity=0.0)),
 }
 
 

@@ -29,6 +29,8 @@ class Isogeometric:
     faces : numbers of the faces to measure, as in the file; none: those that the cameras see
     refine : how often every span between two knots is halved
     degree : to which the surfaces are raised at least; 0: as in the CAD
+    continuity : degrees between neighbouring faces, below which they keep together along their edge, and smoothly where
+        the CAD is smooth; 0: each face moves by itself
     interpolation : of the pictures: "cubic" B-spline; "linear" as in the paper
     steepest : degrees, largest angle between a normal and the line of sight
     systematic : px, standard uncertainty of a smooth shift of each picture that no model explains
@@ -42,6 +44,7 @@ class Isogeometric:
     faces: tuple[int, ...] = ()
     refine: int = 0
     degree: int = 0
+    continuity: float = 45.0
     interpolation: Literal["cubic", "linear"] = "cubic"
     steepest: float = 65.0
     systematic: float = 0.01
@@ -54,6 +57,9 @@ class Isogeometric:
             raise ValueError(f"refine = {self.refine} is not between 0 and {FINEST}: it halves the spans so often")
         if not 0 <= self.degree <= HIGHEST:
             raise ValueError(f"degree = {self.degree} is not between 0 and {HIGHEST}")
+
+        if not 0 <= self.continuity <= 180:
+            raise ValueError(f"continuity = {self.continuity:g} is not between 0 and 180 degrees")
 
     def open(self, files: Files) -> StereoSource:
         """Read photographs, masks and calibration.
@@ -74,7 +80,7 @@ class Isogeometric:
             The landmarks do not fit, the pictures do not show the part twice, or they do not agree; or the model has no
             faces whose control points the pictures can tell apart on this mesh.
         """
-        splines = Splines(self.faces, self.refine, self.degree)
+        splines = Splines(self.faces, self.refine, self.degree, self.continuity)
         correlate = replace(self._stereo.correlate(nominal), splines=splines)
         return self._stereo(source, nominal, correlate)
 

@@ -240,8 +240,7 @@ def _step(
     factors = state.weights * found.clean
     system = system_of(scene, found, factors, noise, freedom, freedom.columns, scale, slides, level.stiffness)
     shape, cameras = system.solve(_equations(scene, found, noise, state, level)[1], camera_right)
-    if freedom.poses != "known" and level.blur == 0 and not scene.space.confined:
-        # the blurred pictures have shown where the surface lies; motions of control points cannot follow every one
+    if freedom.poses != "known" and level.blur == 0:  # the blurred pictures have shown where the surface lies
         shape, cameras = stilled(scene, freedom, state.views, state.deviation, shape, cameras)
     by_cameras = (scene.space.rows(scene) @ system.following @ system.camera_factor)[scene.whole]
     return shape, cameras, float(np.sqrt((by_cameras**2).sum() / max(len(by_cameras), 1)))
@@ -264,7 +263,7 @@ def _equations(scene: Scene, found: Facets, noise: float, state: State, level: L
     space, factors = scene.space, state.weights * found.clean / noise
     matrix, plate = space.matrix(scene, found.node * factors[:, None, None], level.stiffness)
     right = space.gathered(scene, found.right * (state.weights / noise)[:, None])
-    return matrix, right - plate @ state.motion if level.stiffness > 0 else right
+    return matrix, right - plate @ state.motion
 
 
 def _reach(scene: Scene, cameras: Floats, freedom: Freedom) -> float:

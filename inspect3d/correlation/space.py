@@ -54,7 +54,10 @@ class Space(Protocol):
         """Return how motions (k, m) move the corners of the facets, (f, 3, m)."""
 
     def matrix(self, scene: Scene, blocks: Floats, stiffness: float) -> tuple[Matrix, Matrix]:
-        """Return the sum of the facets' blocks (f, 3, 3) with a plate under it, and the plate, (k, k); see `plates`."""
+        """Return the sum of the facets' blocks (f, 3, 3) with a plate under it, and the plate, (k, k); see `plates`.
+
+        The plate is what pulls the shape back to the nominal one.
+        """
 
     def factored(self, scene: Scene, matrix: Matrix) -> Factored:
         """Return the factor of such a matrix.

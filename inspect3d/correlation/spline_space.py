@@ -11,7 +11,7 @@ from scipy import sparse
 
 from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.correlation.dense import DenseFactor, cholesky
-from inspect3d.correlation.space import RIDGE, SUPPORT, Factored, Matrix, typical
+from inspect3d.correlation.space import RIDGE, Factored, Matrix, typical
 
 if TYPE_CHECKING:
     from inspect3d.correlation.evaluation import EvaluationPoints
@@ -19,13 +19,14 @@ if TYPE_CHECKING:
     from inspect3d.nominal.nurbs import Nurbs
 
 FILLED = 0.05  # share of entries that are not zero
+SOFT = 1e-2  # medians of the stiffness of a node; it flattens a bump of four elements by less than a hundredth
 SAMPLES = 4
 """Parts into which the edges of a facet are cut; the centres of what they cut it into are its sample points."""
 
 
 @dataclass(frozen=True, eq=False)
 class SplineSpace:
-    """Motions q (k,) mm of the control points along their normals.
+    """Motions of the control points along their normals, p = Z q mm, by the unknowns q (k,).
 
     Each facet follows the spline by a cubic, fitted to it at the sample points; for the derivatives by q, by the plane
     that fits best there. The solution is that of the cubic: a residual that vanishes does so whatever it is multiplied
@@ -33,34 +34,40 @@ class SplineSpace:
 
     Parameters
     ----------
-    nodes : B (n, k)
-    samples : (16 f, k), the same at the sample points of every facet
+    nodes : (n, c), how the control points move the nodes
+    samples : (16 f, c), the same at the sample points of every facet
     patches : the nominal surfaces, their control points numbered one patch after the other
+    free : Z (c, k), orthonormal columns; none: q = p
     """
 
     nodes: sparse.csr_matrix
     samples: sparse.csr_matrix
     patches: tuple[Nurbs, ...]
+    free: Floats | None = None
 
     @property
     def confined(self) -> bool:
         """Return True."""
         return True
 
+    def within(self, free: Floats) -> SplineSpace:
+        """Return the space of some motions (c, k) of the control points only, orthonormal columns."""
+        return replace(self, free=free)
+
     def rows(self, scene: Scene) -> sparse.csr_matrix:
-        """Return B."""
-        return self.nodes
+        """Return B (n, k)."""
+        return self._rows
 
     def motion(self, scene: Scene, deviation: Floats) -> Floats:
         """Return the q that comes nearest to a deviation (n,) mm."""
-        return DenseFactor(cholesky(self._square)).solve(self.nodes.T @ deviation)
+        return DenseFactor(cholesky(self._square)).solve(self._rows.T @ deviation)
 
     def bent(self, scene: Scene, points: EvaluationPoints, motion: Floats) -> EvaluationPoints:
         """Return the points moved along the normals from the facets to the cubics."""
         from inspect3d.correlation.point_kernel import bend
 
-        flat = (self.nodes @ motion)[scene.triangles]
-        at_samples = (self.samples @ motion).reshape(len(flat), -1) - flat @ _shapes().T
+        flat = (self._rows @ motion)[scene.triangles]
+        at_samples = (self.samples @ self._spread(motion)).reshape(len(flat), -1) - flat @ _shapes().T
         found = np.empty_like(points.places)
         cubics = at_samples @ np.linalg.pinv(_cubics()).T
         bend(points.starts, points.shapes, scene.triangles, scene.normals, cubics, points.places, found)
@@ -69,20 +76,23 @@ class SplineSpace:
     def gathered(self, scene: Scene, parts: Floats) -> Floats:
         """Return what the corners give the control points."""
         flat = parts.reshape(3 * len(parts), int(np.prod(parts.shape[2:])))
-        return (self._corners.T @ flat).reshape(self._corners.shape[1], *parts.shape[2:])
+        summed = self._corners.T @ flat
+        summed = summed if self.free is None else self.free.T @ summed
+        return summed.reshape(len(summed), *parts.shape[2:])
 
     def at_corners(self, scene: Scene, motions: Floats) -> Floats:
         """Return the corners of the planes that fit best."""
-        return (self._corners @ motions).reshape(len(scene.triangles), 3, *motions.shape[1:])
+        return (self._corners @ self._spread(motions)).reshape(len(scene.triangles), 3, *motions.shape[1:])
 
     def matrix(self, scene: Scene, blocks: Floats, stiffness: float) -> tuple[Matrix, Matrix]:
-        """Return full matrices."""
+        """Return full matrices; a soft plate always stays, for control points that hardly anything shows."""
         f = len(blocks)
         spread = sparse.bsr_matrix((blocks, np.arange(f), np.arange(f + 1)), shape=(3 * f, 3 * f))
         median = typical(scene.gathered(np.einsum("fii->fi", blocks)))
-        plate = stiffness * median * scene.plate_of_motions
-        support = median * (SUPPORT * scene.plate_of_motions + RIDGE * self._square)
-        return _congruent(spread, self._packed) + plate + support, plate
+        plate = median * (max(stiffness, SOFT) * scene.plate_of_motions + RIDGE * self._square)
+        found = _congruent(spread, self._packed)
+        found = found if self.free is None else self.free.T @ found @ self.free
+        return found + plate, plate
 
     def factored(self, scene: Scene, matrix: Matrix) -> DenseFactor:
         """Return the full factor."""
@@ -91,7 +101,8 @@ class SplineSpace:
     def blocks(self, scene: Scene, factor: Factored) -> Floats:
         """Return the covariance of the corners of the planes."""
         assert isinstance(factor, DenseFactor)
-        spread = self._corners @ factor.inverse
+        inverse = factor.inverse if self.free is None else self.free @ factor.inverse @ self.free.T
+        spread = self._corners @ inverse
         found = np.empty((len(scene.triangles), 3, 3))
         for i in range(3):
             for j in range(3):
@@ -101,11 +112,11 @@ class SplineSpace:
 
     def smoother(self, scene: Scene, weights: Floats) -> sparse.csr_matrix:
         """Return B: cubics are not biased."""
-        return self.nodes
+        return self._rows
 
     def surfaces(self, motion: Floats) -> tuple[Nurbs, ...]:
         """Return the patches whose control points have moved; those that nobody sees have not."""
-        parts = np.split(motion, np.cumsum([patch.size for patch in self.patches])[:-1])
+        parts = np.split(self._spread(motion), np.cumsum([patch.size for patch in self.patches])[:-1])
         return tuple(
             patch.moved(part[:, None] * patch.directions) for patch, part in zip(self.patches, parts, strict=True)
         )
@@ -114,9 +125,17 @@ class SplineSpace:
         """Return the space of all functions over some of the nodes and facets."""
         return replace(self, nodes=self.nodes[node], samples=self.samples[np.repeat(kept, len(_shapes()))])
 
+    def _spread(self, motions: Floats) -> Floats:
+        """Return the motions of the control points, Z q."""
+        return motions if self.free is None else self.free @ motions
+
+    @cached_property
+    def _rows(self) -> sparse.csr_matrix:
+        return self.nodes if self.free is None else sparse.csr_matrix(self.nodes @ self.free)
+
     @cached_property
     def _corners(self) -> sparse.csr_matrix:
-        """Return (3 f, k), the corners of the plane that fits each function best at the sample points of a facet."""
+        """Return (3 f, c), the corners of the plane that fits each function best at the sample points of a facet."""
         fit = sparse.csr_matrix(np.linalg.pinv(_shapes()))
         facets = self.samples.shape[0] // len(_shapes())
         return (sparse.kron(sparse.identity(facets), fit, format="csr") @ self.samples).tocsr()
@@ -130,7 +149,7 @@ class SplineSpace:
     @cached_property
     def _square(self) -> Floats:
         """Return B'B."""
-        return (self.nodes.T @ self.nodes).toarray()
+        return np.asarray((self._rows.T @ self._rows).toarray())
 
 
 def _congruent(matrix: sparse.csr_matrix, rows: Matrix) -> Floats:

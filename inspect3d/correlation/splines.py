@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
-from scipy import sparse
 
-from inspect3d.arrays import Floats, Integers, unit
+from inspect3d.arrays import Integers
+from inspect3d.correlation.attachment import Attachment
+from inspect3d.correlation.continuity import joints, kept_together
 from inspect3d.correlation.scene import Scene
-from inspect3d.correlation.spline_space import SplineSpace, sample_points
+from inspect3d.correlation.spline_space import SplineSpace
 from inspect3d.nominal.brep import Brep
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.nominal.nurbs import Nurbs
@@ -18,8 +18,6 @@ from inspect3d.nominal.nurbs_face import nurbs_of
 from inspect3d.outcome import InputError, MeasurementError
 
 ENOUGH = 1.5  # nodes for each control point, at the least
-NEAR = 1e-4  # mm; the next step would be far shorter
-FAR = 10.0  # times the median distance from the surface
 
 
 @dataclass(frozen=True)
@@ -31,11 +29,13 @@ class Splines:
     faces : their numbers; none: those that the cameras see
     refine : how often every span between two knots is halved
     degree : to which the surfaces are raised at least; 0: as in the CAD
+    continuity : degrees between neighbouring faces, below which they keep together; see `joints`; 0: they never do
     """
 
     faces: tuple[int, ...] = ()
     refine: int = 0
     degree: int = 0
+    continuity: float = 45.0
 
     def __call__(self, nominal: Nominal, seen: Scene) -> Scene:
         """Return those facets of a scene that lie on the chosen faces, their nodes moved by control points.
@@ -55,9 +55,24 @@ class Splines:
         centres = seen.nodes[seen.triangles].mean(axis=1)
         face = nominal.surface_face[nominal.surface.closest(centres).triangle]
         patches = self._patches(brep, seen, face)
-        kept = np.isin(face, list(patches))
+        kept = np.isin(face, list(patches)) & seen.whole[seen.triangles].all(axis=1)
         rest, _ = seen.restricted(kept)
-        return replace(rest, space=_Attached(rest, patches, face[kept]).space)
+        face = face[kept]
+        rest = replace(rest, space=Attachment(nominal, rest, patches, face).space)
+        moved = np.asarray(rest.space.rows(rest).sum(axis=1)).ravel() > 0
+        if not moved.all():  # corners round a sharp edge, which the face does not move
+            kept = np.asarray(moved[rest.triangles].all(axis=1))
+            rest, face = rest.restricted(kept)[0], face[kept]
+        return self._joined(brep, patches, rest, face)
+
+    def _joined(self, brep: Brep, patches: dict[int, Nurbs], apart: Scene, face: Integers) -> Scene:
+        """Return a scene in which neighbouring faces keep together; `face` (f,) is that of each facet."""
+        space = apart.space
+        assert isinstance(space, SplineSpace)
+        rows, shifts = joints(brep, patches, apart, face, self.continuity)
+        if not len(rows):
+            return apart
+        return replace(apart, space=space.within(kept_together(rows, shifts, space.nodes, apart)))
 
     def _patches(self, brep: Brep, seen: Scene, face: Integers) -> dict[int, Nurbs]:
         """Return the chosen faces by number, those of a choice by itself only where the mesh is fine enough."""
@@ -96,82 +111,3 @@ def _too_coarse(number: int, functions: int, nodes: int) -> str:
         f"The mesh is too coarse for face {number}: {functions} of its control points move the {nodes} nodes that two "
         "cameras see. Set element_size or `refine` lower."
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Attached:
-    """A scene whose facets lie on NURBS patches.
-
-    Parameters
-    ----------
-    patches : by the number of their face
-    face : (f,), of each facet of the scene
-    """
-
-    scene: Scene
-    patches: dict[int, Nurbs]
-    face: Integers
-
-    @property
-    def space(self) -> SplineSpace:
-        """Return the motions of the nodes that the control points allow."""
-        scene, shapes = self.scene, sample_points()
-        total = sum(patch.size for patch in self.patches.values())
-        samples = np.einsum("si,fid->fsd", shapes, scene.nodes[scene.triangles])
-        normals = unit(np.einsum("si,fid->fsd", shapes, scene.normals[scene.triangles]))
-        of_nodes, of_samples = [], []
-        order_of_nodes, order_of_facets = [], []
-        first = 0
-        for number, patch in self.patches.items():
-            facets = np.flatnonzero(self.face == number)
-            nodes, corners = np.unique(scene.triangles[facets], return_inverse=True)
-            uv = patch.parameters(scene.nodes[nodes])
-            own = np.flatnonzero(self._node_face[nodes] == number)
-            of_nodes.append(_rows(patch, uv[own], scene.normals[nodes[own]], first, total))
-            order_of_nodes.append(nodes[own])
-            guess = np.einsum("si,fid->fsd", shapes, uv[corners.reshape(-1, 3)]).reshape(-1, 2)
-            uv = _near(patch, samples[facets].reshape(-1, 3), guess)
-            of_samples.append(_rows(patch, uv, normals[facets].reshape(-1, 3), first, total))
-            order_of_facets.append(facets)
-            first += patch.size
-        return SplineSpace(
-            _sorted(of_nodes, order_of_nodes, 1),
-            _sorted(of_samples, order_of_facets, len(shapes)),
-            tuple(self.patches.values()),
-        )
-
-    @cached_property
-    def _node_face(self) -> Integers:
-        """Return the face of each node, (n,), of those around it the one of the lowest number."""
-        face = np.full(len(self.scene.nodes), np.iinfo(np.int64).max)
-        np.minimum.at(face, self.scene.triangles.ravel(), np.repeat(self.face, 3))
-        return face
-
-
-def _sorted(blocks: list[sparse.csr_matrix], orders: list[Integers], each: int) -> sparse.csr_matrix:
-    """Return blocks, with `each` rows for every number in their orders, as one matrix in the order of the numbers."""
-    if len(blocks) == 1:
-        return blocks[0]
-    order = np.argsort(np.concatenate(orders))
-    return sparse.vstack(blocks, format="csr")[(order[:, None] * each + np.arange(each)).ravel()]
-
-
-def _near(patch: Nurbs, points: Floats, guess: Floats) -> Floats:
-    """Return the parameters (p, 2) of points (p, 3) mm near the surface, from a guess that seams may have spoilt."""
-    uv = patch.descended(points, guess, NEAR)
-    low, high = patch.bounds
-    away = np.linalg.norm(patch.points(uv) - points, axis=1)
-    doubted = ((uv <= low) | (uv >= high)).any(axis=1) | (away > FAR * np.median(away))
-    uv[doubted] = patch.parameters(points[doubted])
-    return uv
-
-
-def _rows(patch: Nurbs, uv: Floats, normals: Floats, first: int, total: int) -> sparse.csr_matrix:
-    """Return how far each control point's motion along its normal moves places (p,) along theirs, (p, total).
-
-    Parameters
-    ----------
-    first : column of the patch's first control point
-    """
-    rows = patch.along(uv, normals)
-    return sparse.csr_matrix((rows.data, rows.indices + first, rows.indptr), shape=(len(uv), total))

@@ -20,21 +20,22 @@ SMALL = 1e-3  # mm, or of a motion of the part
 def stilled(
     scene: Scene, freedom: Freedom, views: Sequence[View], deviation: Floats, shape: Floats, cameras: Floats
 ) -> tuple[Floats, Floats]:
-    """Return a step of shape (n,) and cameras (m,) with a motion of the part added under which its surface keeps still.
+    """Return a step of shape (k,) and cameras (m,) with a motion of the part added under which its surface keeps still.
 
     Moving the part, and growing it where the scale is not known, together with all cameras changes nothing that the
     pictures show. The gauge of the system takes the motion that leaves the shape none of its own, and so lets what the
     pictures show weakly slide the surface through them by many pixels: over noise that is another every time, and over
     the outline of the part. Here the motions that move the surface in itself mostly are chosen such that its points
-    stay where they are in the mean of the pictures, as far as they can.
+    stay where they are in the mean of the pictures, as far as they can and the scene's space has such motions.
     """
     left, values, right = motions_of(scene, freedom)
     soft = values**2 <= SOFT * values[0] ** 2
     if not soft.any():
         return shape, cameras
-    fields = -(left * values)[:, soft]
+    rows, fields = scene.space.rows(scene), scene.space.motion(scene, -(left * values)[:, soft])
     changes = moving_cameras(scene, freedom, views, right[soft])
     some = slice(None, None, 1 + len(scene.nodes) // SAMPLE)
+    rows = rows[some]
     normals = scene.normals[some]
     places = scene.nodes[some] + deviation[some, None] * normals
     across = _tangents(normals)
@@ -45,7 +46,7 @@ def stilled(
     ]
 
     def slide(shape: Floats, cameras: Floats) -> Floats:
-        moved = places + shape[some, None] * normals
+        moved = places + (rows @ shape)[:, None] * normals
         slides = [
             np.einsum("nij,nj->ni", inverse[k], view.project(moved) - here[k])
             for k, view in enumerate(freedom.moved(views, cameras))

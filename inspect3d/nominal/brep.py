@@ -60,6 +60,16 @@ class Brep:
         return tuple(None if BRep_Tool.Degenerated_s(edge) else BRepAdaptor_Curve(edge) for edge in self.edges)
 
     @cached_property
+    def edge_numbers(self) -> Any:
+        """Return an indexed map in which the number of an edge is its place in `edges`, from 1."""
+        from OCP.TopTools import TopTools_IndexedMapOfShape
+
+        numbers = TopTools_IndexedMapOfShape()
+        for edge in self.edges:
+            numbers.Add(edge)
+        return numbers
+
+    @cached_property
     def diagonal(self) -> float:
         """Return the diagonal of a box that holds the part, mm; up to a few percent too long."""
         from OCP.Bnd import Bnd_Box
