@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from inspect3d.camera import Camera, View
 from inspect3d.compare.feature_estimate import FeatureEstimate
 from inspect3d.compare.segmentation import Segmentation
+from inspect3d.compare.sensitivity import OtherAlignment, Sensitivity
 from inspect3d.deviate.deviation import Deviation
 from inspect3d.deviate.errors_file import read_errors
 from inspect3d.inspection import compared, versions
@@ -123,6 +124,7 @@ def _run(finished: Finished, names: Mapping[str, str]) -> _Run:
                 errors = read_errors(finished.folder / f"{name}_errors.npz")
                 mesh = replace(found.mesh, face=errors.face)
                 part = replace(part, covariance=errors.covariance, sources=errors.sources, **_map(found))
+                part = replace(part, sensitivity=_sensitivity(values["sensitivity"], part.alignments[0], mesh))
                 if part.deviation is not None:
                     part = replace(part, regions=Segmentation()(part.deviation, errors.covariance, mesh))
                 part = replace(part, **_points(finished.folder / f"{name}_points.vtp"))
@@ -165,6 +167,15 @@ def _map(found: FinishedMap) -> dict[str, Any]:
         "verdict": verdict if verdict.any() else None,
         "residual": found.fields.get("residual"),
     }
+
+
+def _sensitivity(values: Mapping[str, Any], alignment: Alignment, mesh: InspectionMesh) -> Sensitivity:
+    """Return how much a map depends on its alignment, from the small motions to the other choices."""
+    others = tuple(
+        OtherAlignment.of(other["alignment"], np.array(other["motion"]), np.array(other["origin"]), mesh)
+        for other in values["others"]
+    )
+    return Sensitivity.of(values["chosen"], others, alignment, mesh, tuple(values["remarks"]))
 
 
 def _points(file: Path) -> dict[str, Any]:

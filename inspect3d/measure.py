@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
@@ -134,6 +134,7 @@ class NodalMeasurement:
     views : the cameras in the CAD frame, if it has any
     residual : (n,) normalised grey-level residual at every node of the mesh, NaN where there is none
     hidden : the motions that the data cannot tell, in words
+    weak : (k, w) what those of them that change `value` do to it, a column each, of any size
     contributions : to the uncertainty: source, size with its unit, and how it enters
     figures : what the report shows of the way there
     surfaces : the measured surfaces in the frame of `value`, of a method that moves such
@@ -151,6 +152,7 @@ class NodalMeasurement:
     views: tuple[View, ...] = ()
     residual: Floats | None = None
     hidden: tuple[str, ...] = ()
+    weak: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     contributions: tuple[tuple[str, str, str], ...] = ()
     figures: tuple[Figure, ...] = ()
     surfaces: tuple[Nurbs, ...] = ()
@@ -160,6 +162,8 @@ class NodalMeasurement:
         object.__setattr__(self, "node", integers(self.node, "node", None))
         object.__setattr__(self, "value", floats(self.value, "value", len(self.node)))
         object.__setattr__(self, "sound", booleans(self.sound, "sound", len(self.node)))
+        weak = self.weak if self.weak.size else np.zeros((len(self.node), 0))
+        object.__setattr__(self, "weak", floats(weak, "weak", len(self.node), None))
 
 
 @runtime_checkable

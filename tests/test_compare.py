@@ -7,8 +7,10 @@ import pytest
 
 from inspect3d.compare.compare import Compare
 from inspect3d.compare.measured_map import MeasuredMap
+from inspect3d.compare.resolution import unresolved
 from inspect3d.deviate.deviate import Deviate
 from inspect3d.deviate.deviation import Deviation
+from inspect3d.deviate.low_rank import LowRank
 from inspect3d.deviate.map_covariance import Independent, MapCovariance
 from inspect3d.measure import Cloud
 from inspect3d.pose import Pose
@@ -39,12 +41,15 @@ def scan(nominal, seed, count, noise, name="scan", deviation=form):
     return MeasuredMap(name, found.deviation, found.covariance)
 
 
-def made(nominal, name, value, sigma=0.004, seen=None, **known):
-    """Return a map with independent errors of which nothing but `value` is known."""
+def made(nominal, name, value, sigma=0.004, seen=None, spread=(), **known):
+    """Return a map with independent errors, and in its weak motions errors of the sizes `spread` (mm) besides."""
     node = np.arange(len(nominal.mesh)) if seen is None else np.flatnonzero(seen)
     full, sigmas = np.full(len(nominal.mesh), np.nan), np.full(len(nominal.mesh), np.nan)
     full[node], sigmas[node] = value[node], sigma
-    covariance = MapCovariance(node, Independent(np.full(len(node), sigma**2)), np.zeros((len(node), 0)), **known)
+    own = Independent(np.full(len(node), sigma**2))
+    if spread:
+        own = LowRank(own.variances, known["weak"] * spread)
+    covariance = MapCovariance(node, own, np.zeros((len(node), 0)), **known)
     return MeasuredMap(name, Deviation(full, sigmas, np.isfinite(full)), covariance)
 
 
@@ -76,6 +81,30 @@ def test_the_rigid_motion_between_two_maps_is_no_difference(nominal):
     assert found.en_rms < 1e-6
 
 
+def test_a_step_that_each_method_resolves_in_its_own_way_is_no_region_and_a_defect_of_one_beside_it_is(nominal):
+    mesh, random = nominal.mesh, np.random.default_rng(5)
+    x, y = mesh.nodes[:, 0], mesh.nodes[:, 1]
+    step = 0.04 * (x > 30.3)
+    sharp = step + random.normal(0, 0.003, len(x))
+    blurred = 0.04 / (1 + np.exp(-(x - 30.3) / 0.8)) + random.normal(0, 0.003, len(x))
+    found = pair(nominal, made(nominal, "a", sharp, 0.003), made(nominal, "b", blurred, 0.003))
+    assert not found.regions
+    assert any("a step that both maps show" in words for words in found.words)
+    bump = 0.06 * np.exp(-((x - 30) ** 2 + (y - 20) ** 2) / 20)
+    region, *_ = pair(nominal, made(nominal, "a", sharp + bump, 0.003), made(nominal, "b", blurred, 0.003)).regions
+    assert np.hypot(*(region.place[:2] - [30, 20])) < 4
+
+
+def test_a_slope_that_both_maps_show_hides_no_difference(nominal):
+    mesh = nominal.mesh
+    slope = 0.01 * mesh.nodes[:, 0]
+    a, b = (made(nominal, name, slope, 0.002) for name in "ab")
+    height = unresolved(a, b, mesh, np.arange(len(mesh)))
+    middle = (np.abs(mesh.nodes[:, :2] - [30, 22.5]) < [20, 12]).all(axis=1)
+    assert np.median(height[middle]) == 0
+    assert height.max() < 0.01 * 2 * mesh.edge_length
+
+
 def test_two_maps_held_in_given_poses_are_compared_as_they_are(nominal):
     value = form(nominal.mesh.nodes[:, 0], nominal.mesh.nodes[:, 1])
     a, b = (made(nominal, name, value + shift, refined=False) for name, shift in (("a", 0.0), ("b", 0.01)))
@@ -92,6 +121,40 @@ def test_the_scale_goes_from_both_maps_if_one_cannot_tell_it(nominal):
     assert np.abs(pair(nominal, known, free).difference).max() < 1e-9
     told = made(nominal, "b", 0 * grown)
     assert np.abs(pair(nominal, known, told).difference).max() > 1e-4
+
+
+def bends(mesh):
+    """Return two slow motions (n, 2) that the pictures of a stereo method hardly tell."""
+    x, y = mesh.nodes[:, 0] / 30 - 1, mesh.nodes[:, 1] / 22 - 1
+    return np.column_stack([x * x, x * y])
+
+
+def test_motions_that_pictures_hardly_tell_go_from_both_and_leave_a_local_defect(nominal):
+    x, y = nominal.mesh.nodes[:, 0], nominal.mesh.nodes[:, 1]
+    bump = 0.06 * np.exp(-((x - 40) ** 2 + (y - 25) ** 2) / 20)
+    noise = np.random.default_rng(3).normal(0, 0.004, (2, len(x)))
+    weak = bends(nominal.mesh)
+    a = made(nominal, "a", bump + noise[0])
+    b = made(nominal, "b", noise[1] + weak @ [0.09, -0.05], weak=weak, spread=(0.08, 0.08))
+    found = pair(nominal, a, b)
+    far = bump < 1e-4
+    assert 0.45 < np.sqrt(np.mean(found.en[far] ** 2)) < 0.55
+    assert (found.en[bump > 0.03] > 1).all()
+    assert np.nanmax(found.sigma) < 0.008
+    assert "2 motions of cameras and shape together that the pictures of b hardly tell" in found.gauge
+    assert any("as their stated uncertainties allow" in words for words in found.words)
+    sure = made(nominal, "b", b.deviation.value, weak=weak, spread=(0.01, 0.01))
+    assert any("more than their stated uncertainties explain" in words for words in pair(nominal, a, sure).words)
+
+
+def test_maps_in_given_poses_keep_them_when_weak_motions_go(nominal):
+    weak = bends(nominal.mesh)
+    value = np.zeros(len(nominal.mesh))
+    a = made(nominal, "a", value + 0.01 * nominal.mesh.nodes[:, 0] / 60, refined=False)
+    b = made(nominal, "b", 0.05 * weak[:, 1], refined=False, weak=weak, spread=(0.08, 0.08))
+    found = pair(nominal, a, b)
+    assert 0.005 < np.ptp(found.difference) < 0.02
+    assert found.gauge.startswith("2 motions")
 
 
 def test_a_defect_that_one_method_shows_does_not_tilt_the_difference(nominal):

@@ -65,6 +65,8 @@ def test_maps_of_separate_runs_compare_like_those_of_one_run(runs):
     for part, before in zip(apart.parts, together.parts, strict=True):
         np.testing.assert_allclose(part.deviation.value, before.deviation.value, atol=1e-9)
         np.testing.assert_array_equal(part.verdict, before.verdict)
+        np.testing.assert_allclose(part.sensitivity.spread, before.sensitivity.spread, atol=1e-12)
+        np.testing.assert_allclose(part.sensitivity.within, before.sensitivity.within, rtol=0.01)
         values = json.loads((folder / f"only-{part.name}" / "results.json").read_text(encoding="utf-8"))
         alignment = values["measurements"][part.name]["alignment"]
         np.testing.assert_array_equal(part.alignments[0].covariance, alignment["covariance"])

@@ -15,11 +15,11 @@ def agreement_words(comparison: Comparison, remarks: tuple[str, ...] = ()) -> tu
         return (comparison.reason,)
     low, high = comparison.limits_of_agreement
     words = [
-        f"{comparison.a} and {comparison.b} both observed {100 * comparison.coverage:.0f} % of the area, edges apart "
-        f"({comparison.nodes} nodes).",
+        f"{comparison.a} and {comparison.b} both observed {100 * comparison.coverage:.0f} % of the area, edges not "
+        f"counted ({comparison.nodes} nodes).",
         f"There {comparison.a} minus {comparison.b} is {_micro(comparison.mean)} on average with a standard deviation "
         f"of {_micro(comparison.std)}: about 95 % of the differences lie between {_micro(low)} and {_micro(high)} "
-        "(limits of agreement).",
+        f"(limits of agreement).{_correlated(comparison.correlation)}",
         comparison.gauge,
     ]
     if comparison.en_rms is None or comparison.en_above_1 is None:
@@ -29,6 +29,10 @@ def agreement_words(comparison: Comparison, remarks: tuple[str, ...] = ()) -> tu
     if comparison.regions is not None:
         words.append(_regions(comparison.regions))
     return (*words, *remarks)
+
+
+def _correlated(correlation: float | None) -> str:
+    return "" if correlation is None else f" The correlation of the two maps is {correlation:.2f}.".replace("-", "−")
 
 
 def _judged(rms: float, above: float) -> str:
@@ -47,7 +51,7 @@ def _regions(regions: tuple[DeviationRegion, ...]) -> str:
     if not regions:
         return "No region stands out in which they differ beyond doubt (5 % for the whole part)."
     places = "; ".join(
-        f"({', '.join(f'{x:.1f}' for x in region.place)}) mm, {region.area:.0f} mm², {_micro(region.mean)} on average"
+        f"({', '.join(_number(x) for x in region.place)}) mm, {region.area:.0f} mm², {_micro(region.mean)} on average"
         for region in regions[:3]
     )
     count = "one region" if len(regions) == 1 else f"{len(regions)} regions"
@@ -55,4 +59,8 @@ def _regions(regions: tuple[DeviationRegion, ...]) -> str:
 
 
 def _micro(length: float) -> str:
-    return f"{1000 * length:.1f} µm"
+    return f"{_number(1000 * length)} µm"
+
+
+def _number(value: float) -> str:
+    return f"{value:.1f}".replace("-", "−")

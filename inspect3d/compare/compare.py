@@ -14,11 +14,13 @@ from inspect3d.compare.common_gauge import CommonGauge, common_gauge
 from inspect3d.compare.comparison import Comparison
 from inspect3d.compare.measured_map import MeasuredMap
 from inspect3d.compare.region_test import RegionTest
+from inspect3d.compare.resolution import unresolved
 from inspect3d.deviate.statistics import Statistics
 from inspect3d.measure import FieldCovariance
 from inspect3d.nominal.nominal import InspectionMesh
 
 AGREEMENT = 1.96  # standard deviations either side of the mean that hold 95 % of normal differences
+LEAST_STEPPED = 0.01  # share of the nodes beside steps; fewer may come from noise
 LEAST_NODES = 12  # fewer common nodes are no comparison
 
 
@@ -48,6 +50,12 @@ class Compare:
         difference, areas = value_a - value_b, mesh.areas[at]
         figures = Statistics.of(difference, areas)
         reason = _not_independent(a, b)
+        remarks, weighed = _remarks(a, b, gauge), {}
+        if not reason:
+            steps = unresolved(a, b, mesh, at)
+            weighed = self._weighed(difference, gauge.covariance(a, b, at), mesh, at, steps)
+            weak = gauge.taken(a.deviation.value[at] - b.deviation.value[at], a, b, at)
+            remarks = (*_stepped(steps, np.abs(difference) / (2 * weighed["sigma"][at])), *weak, *remarks)
         found = replace(
             _apart(a, b, mesh),
             common=common,
@@ -59,17 +67,21 @@ class Compare:
             limits_of_agreement=(figures.mean - AGREEMENT * figures.std, figures.mean + AGREEMENT * figures.std),
             correlation=_correlation(value_a, value_b, areas),
             gauge=gauge.words,
-            **({} if reason else self._weighed(difference, gauge.covariance(a, b, at), mesh, at)),
+            **weighed,
         )
-        return replace(found, words=agreement_words(found, _remarks(a, b, gauge)))
+        return replace(found, words=agreement_words(found, remarks))
 
     def _weighed(
-        self, difference: Floats, covariance: FieldCovariance, mesh: InspectionMesh, at: Integers
+        self, difference: Floats, covariance: FieldCovariance, mesh: InspectionMesh, at: Integers, steps: Floats
     ) -> dict[str, Any]:
-        """Return what the uncertainty of the difference at the common nodes `at` (k,) adds to a comparison."""
+        """Return what the uncertainty of the difference at the common nodes `at` (k,) adds to a comparison.
+
+        Regions count where the difference is larger than the `steps` (k,) mm beside, which each method resolves in its
+        own way.
+        """
         sigma = np.sqrt(covariance.variances)
         en = np.abs(difference) / (2 * sigma)
-        regions = self.test(difference, covariance, mesh.nodes[at], mesh.normals[at], mesh.areas[at])
+        regions = self.test(difference, covariance, mesh.nodes[at], mesh.normals[at], mesh.areas[at], steps)
         return {
             "sigma": _spread(sigma, at, len(mesh)),
             "en_rms": float(np.sqrt(np.mean(en**2))),
@@ -130,6 +142,18 @@ def _remarks(a: MeasuredMap, b: MeasuredMap, gauge: CommonGauge) -> tuple[str, .
     if a.covariance.calibration and b.covariance.calibration:
         remarks.append("The calibrations are taken to be those of two instruments, their errors independent.")
     return tuple(remarks)
+
+
+def _stepped(steps: Floats, en: Floats) -> tuple[str, ...]:
+    """Return what the search for regions allows for beside steps (k,) mm, a sentence; none where it does not matter."""
+    beside = int(np.count_nonzero((steps > 0) & (en > 1)))
+    if not beside or np.mean(steps > 0) < LEAST_STEPPED:
+        return ()
+    nodes = "One node" if beside == 1 else f"{beside} nodes"
+    return (
+        f"{nodes} with E_n above 1 lie{'s' * (beside == 1)} within an element of a step that both maps show: a "
+        "difference up to its height counts there as one of resolution, not as a region.",
+    )
 
 
 def _spread(values: Floats, at: Integers, n: int) -> Floats:

@@ -51,7 +51,13 @@ class RegionTest:
     seed: int = 0
 
     def __call__(
-        self, values: Floats, covariance: FieldCovariance, nodes: Floats, normals: Floats, areas: Floats
+        self,
+        values: Floats,
+        covariance: FieldCovariance,
+        nodes: Floats,
+        normals: Floats,
+        areas: Floats,
+        explained: Floats | None = None,
     ) -> tuple[DeviationRegion, ...]:
         """Return the regions of a field, the clearest first; their nodes are numbered as in the field.
 
@@ -61,12 +67,15 @@ class RegionTest:
         covariance : of the values
         nodes, normals : (k, 3) mm and unit
         areas : (k,) mm²
+        explained : (k,) mm, by how much each value may differ from zero, up or down, for a reason that is known; what
+            is beyond counts
         """
         patches = Patches.of(nodes, normals, areas, self.most)
         whole = patches.covariance(covariance)
         factor = linalg.cholesky(whole + ROUNDED * whole.diagonal().max() * np.eye(len(whole)), lower=True)
         drawn = factor @ np.random.default_rng(self.seed).normal(size=(len(whole), self.draws))
-        trust, field = patches.areas / whole.diagonal(), patches.means @ values
+        beyond = values if explained is None else np.sign(values) * np.maximum(np.abs(values) - explained, 0.0)
+        trust, field = patches.areas / whole.diagonal(), patches.means @ beyond
         windows = [patches.windows(width * patches.spacing, trust) for width in self.widths]
         sigmas = [np.sqrt(np.asarray(w.multiply(w @ whole).sum(axis=1)).ravel()) for w in windows]
         chance = np.max(

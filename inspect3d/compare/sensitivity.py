@@ -59,6 +59,20 @@ class Sensitivity:
     within: Floats
     remarks: tuple[str, ...] = ()
 
+    @classmethod
+    def of(
+        cls,
+        chosen: str,
+        others: tuple[OtherAlignment, ...],
+        alignment: Alignment,
+        mesh: InspectionMesh,
+        remarks: tuple[str, ...] = (),
+    ) -> Sensitivity:
+        """Return it, with what the covariance of the chosen alignment alone makes uncertain."""
+        rows = jacobian(mesh.nodes, mesh.normals, alignment.origin)
+        variance = np.einsum("ij,jk,ik->i", rows, alignment.covariance, rows)
+        return cls(chosen, others, np.sqrt(np.maximum(variance, 0.0)), remarks)
+
     @property
     def spread(self) -> Floats:
         """Return the largest less the smallest deviation of each node between the choices, (n,) mm."""
@@ -100,9 +114,7 @@ def sensitivity(
             found.append(OtherAlignment.of(f"{len(landmarks[0])} landmarks", motion, alignment.origin, mesh))
         except InputError as error:
             remarks.append(f"An alignment by landmarks cannot be shown: {error}")
-    rows = jacobian(mesh.nodes, mesh.normals, alignment.origin)
-    variance = np.einsum("ij,jk,ik->i", rows, alignment.covariance, rows)
-    return Sensitivity(chosen, tuple(found), np.sqrt(np.maximum(variance, 0.0)), tuple(remarks))
+    return Sensitivity.of(chosen, tuple(found), alignment, mesh, tuple(remarks))
 
 
 def _small(motion: Pose, origin: Floats) -> Floats:

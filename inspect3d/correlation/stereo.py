@@ -151,7 +151,7 @@ class Stereo:
         grey = [photograph.grey for photograph in source.photographs]
         steps: list[Step] = []
         shape = correlate(nominal, grey, begin.views, begin.freedom, source.masks, _telling(steps))
-        cad_from_rig = Pose.identity()
+        cad_from_rig, nodes = Pose.identity(), len(shape.scene.node)
         if begin.rig_view is not None:
             cad_from_rig = shape.views[0].camera_from_cad.inverse() @ begin.rig_view.camera_from_cad
         return NodalMeasurement(
@@ -166,6 +166,7 @@ class Stereo:
             views=shape.views,
             residual=shape.residual,
             hidden=tuple(motion.words for motion in shape.hidden),
+            weak=np.array([motion.pattern for motion in shape.hidden if motion.pattern.any()]).reshape(-1, nodes).T,
             contributions=contributions(shape),
             figures=(*begin.figures, *illustrated(nominal, shape, begin.views, grey, steps, start.picks)),
             surfaces=shape.scene.space.surfaces(shape.state.motion),

@@ -45,6 +45,7 @@ def write_errors(path: Path, covariance: MapCovariance, sources: Mapping[str, st
         calibration=np.array(covariance.calibration),
         refined=np.array(covariance.refined),
         scale_known=np.array(covariance.scale_known),
+        weak=covariance.weak.astype(np.float32),
         sources=np.array(json.dumps(dict(sources))),
         face=face.astype(np.int32),
     )
@@ -68,6 +69,7 @@ def read_errors(path: Path) -> SavedErrors:
                 calibration=float(file["calibration"]),
                 refined=bool(file["refined"]),
                 scale_known=bool(file["scale_known"]),
+                weak=file["weak"].astype(np.float64),
             )
             return SavedErrors(covariance, json.loads(str(file["sources"])), file["face"].astype(np.int64))
     except (OSError, KeyError, ValueError, BadZipFile) as error:

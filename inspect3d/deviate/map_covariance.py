@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -66,6 +66,8 @@ class MapCovariance:
     calibration : mm, standard uncertainty that all nodes share
     refined : whether the map was fitted to the CAD, so that its rigid motion means nothing
     scale_known : False where the method cannot tell a larger part from a smaller one
+    weak : (k, w) what the motions of cameras and shape that the method hardly tells do to the map, a column each, of
+        any size; their errors are in `own`
     """
 
     node: Integers
@@ -75,11 +77,14 @@ class MapCovariance:
     calibration: float = 0.0
     refined: bool = True
     scale_known: bool = True
+    weak: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
         node = integers(self.node, "node", None)
         object.__setattr__(self, "node", node)
         object.__setattr__(self, "pose", floats(self.pose, "pose", len(node), None))
+        weak = self.weak if self.weak.size else np.zeros((len(node), 0))
+        object.__setattr__(self, "weak", floats(weak, "weak", len(node), None))
 
 
 def pose_errors(rows: Floats, covariance: Floats) -> Floats:

@@ -112,6 +112,7 @@ class DeviateNodes:
             calibration=self.calibration,
             refined=self.refine,
             scale_known=measured.scale_known,
+            weak=measured.weak[seen],
         )
         variance = variances_without(covariance.own, modes, solver) + shared**2
         variance = variance + self.calibration**2 + nominal.chord**2 / 3
