@@ -203,7 +203,10 @@ def view(
     from inspect3d.web.serve import serve
     from inspect3d.web.view_page import view_of
 
-    serve(view_of(out, recipe).page, host, browser, typer.echo)
+    found = view_of(out, recipe)
+    for words in found.damaged:
+        typer.echo(f"warning: {words}", err=True)
+    serve(found.page, host, browser, typer.echo)
 
 
 @app.command()

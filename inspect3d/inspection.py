@@ -15,6 +15,7 @@ from inspect3d import __version__
 from inspect3d.compare.compare import Compare
 from inspect3d.compare.comparison import Comparison
 from inspect3d.compare.measured_map import MeasuredMap
+from inspect3d.compare.tolerances import inside
 from inspect3d.job import Job, measured
 from inspect3d.nominal.load import load_nominal
 from inspect3d.nominal.nominal import InspectionMesh, Nominal
@@ -85,7 +86,8 @@ def inspect(recipe: Recipe, progress: Progress) -> Record:
     )
     with progress.stage("comparing the methods"):
         comparisons = compared(parts, nominal.mesh)
-    return Record(recipe, nominal, parts, inputs, versions(), _warnings(recipe, nominal), comparisons)
+    warnings = (*_warnings(recipe, nominal), *_unmeasured(recipe, nominal.mesh, parts))
+    return Record(recipe, nominal, parts, inputs, versions(), warnings, comparisons)
 
 
 def compared(parts: tuple[MeasuredPart, ...], mesh: InspectionMesh) -> tuple[Comparison, ...]:
@@ -139,6 +141,24 @@ def _warnings(recipe: Recipe, nominal: Nominal) -> tuple[str, ...]:
         height = (nominal.mesh.nodes - plane.point) @ np.array(plane.normal)
         if not height.min() <= 0 <= height.max():
             warnings.append(f"The plane of report.sections[{k}] does not meet the part, so there is no profile of it.")
+    for feature in recipe.part.features:
+        if not inside(feature.place, nominal.mesh.nodes, nominal.mesh.face).any():
+            warnings.append(
+                f"No node of the part lies in the place marked for the feature {feature.name!r}: it may lie beside it."
+            )
+    return tuple(warnings)
+
+
+def _unmeasured(recipe: Recipe, mesh: InspectionMesh, parts: tuple[MeasuredPart, ...]) -> tuple[str, ...]:
+    """Return which methods observed nothing where a feature is marked on the part, a sentence for each feature."""
+    warnings = []
+    for feature in recipe.part.features:
+        marked = inside(feature.place, mesh.nodes, mesh.face)
+        blind = [part.name for part in parts if part.deviation and not part.deviation.observed[marked].any()]
+        if blind and marked.any():
+            warnings.append(
+                f"{' and '.join(blind)} observed no node in the place marked for the feature {feature.name!r}."
+            )
     return tuple(warnings)
 
 

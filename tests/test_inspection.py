@@ -128,6 +128,21 @@ def test_a_section_beside_the_part_is_warned_of(tmp_path):
     ]
 
 
+def waves(name, box):
+    """Return the table of a waviness in a box."""
+    place = f"place = {{ box = {box} }}\nacross = [1, 0, 0]\nwavelength = 8.0"
+    return f'[[part.features]]\nname = "{name}"\nkind = "waviness"\n{place}\n'
+
+
+def test_a_feature_marked_where_nothing_is_or_nothing_was_measured_is_warned_of(tmp_path):
+    boxes = {"beside": [[200, 0, 0], [210, 9, 9]], "beneath": [[-1, -1, -1], [99, 99, 0.01]]}
+    path = recipe(tmp_path, "".join(waves(name, box) for name, box in boxes.items()))
+    beside = "No node of the part lies in the place marked for the feature 'beside': it may lie beside it."
+    assert [line for line in check(path) if "feature" in line] == [beside]
+    beneath = "laser observed no node in the place marked for the feature 'beneath'."
+    assert inspect(load_recipe(path), Progress()).warnings == (beside, beneath)
+
+
 def test_check_reads_everything_and_measures_nothing(tmp_path):
     lines = check(recipe(tmp_path))
     assert any("59394" in line.replace(" ", "") for line in lines)

@@ -18,6 +18,7 @@ from inspect3d.compare.verdict import verdict
 from inspect3d.deviate.deviation import Deviation
 from inspect3d.deviate.errors_file import write_errors
 from inspect3d.deviate.map_covariance import Independent, MapCovariance
+from inspect3d.outcome import InputError
 from inspect3d.recipe import load_recipe
 from inspect3d.report.maps import map_polydata
 from inspect3d.report.results import as_json, results
@@ -212,6 +213,23 @@ def test_limits_and_colours_are_chosen_and_a_picture_is_kept(page, tmp_path):
     assert "<" not in download.value.suggested_filename
     download.value.save_as(tmp_path / "kept.png")
     assert min(cv2.imread(str(tmp_path / "kept.png")).shape[:2]) > 800
+
+
+def test_a_broken_map_is_told_on_the_terminal_and_the_others_are_shown(out, tmp_path):
+    broken = tmp_path / "broken"
+    shutil.copytree(out, broken)
+    (broken / "stereo.vtp").write_text("<VTKFile")
+    assert view_of([broken], None).damaged == [
+        f"{broken / 'stereo.vtp'} is not a map of inspect3d: run the inspection again."
+    ]
+    command = [sys.executable, "-m", "inspect3d", "view", str(broken), "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
+        assert "stereo.vtp is not a map" in server.stderr.readline()
+        assert server.stdout.readline().startswith("view: ")
+        server.terminate()
+    (broken / "laser.vtp").unlink()
+    with pytest.raises(InputError, match=r"laser\.vtp is missing"):
+        view_of([broken], None)
 
 
 def test_ctrl_c_stops_the_server_cleanly_and_the_page_left_open_says_so(chromium, out):

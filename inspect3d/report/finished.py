@@ -15,6 +15,8 @@ from inspect3d.file_name import file_name
 from inspect3d.nominal.nominal import InspectionMesh
 from inspect3d.outcome import InputError, Status
 
+NO_MAP = "{} is not a map of inspect3d: run the inspection again."
+
 
 @dataclass(frozen=True, eq=False)
 class FinishedMap:
@@ -62,6 +64,12 @@ class Finished:
         """Return the names of the measurements that have a map."""
         return [name for name, each in self.values["measurements"].items() if Status(each["status"]).has_map]
 
+    @property
+    def damaged(self) -> dict[str, str]:
+        """Return the measurements whose map is missing or broken, as far as can be told at once, and what is wrong."""
+        found = {name: _damage(self.folder / f"{file_name(name)}.vtp") for name in self.with_map}
+        return {name: words for name, words in found.items() if words}
+
     def map(self, name: str | None = None) -> FinishedMap:
         """Return the map of a measurement, by default of the first that has one.
 
@@ -87,6 +95,20 @@ class Finished:
             raise InputError(f"results.json in {self.folder} is not of inspect3d: {error}.") from error
 
 
+def _damage(file: Path) -> str:
+    """Return what is wrong with the file of a map at first sight, or nothing.
+
+    VTK complains on standard error before it says that it cannot read a file, so it is not asked.
+    """
+    if not file.is_file():
+        return f"{file} is missing: run the inspection again."
+    with file.open("rb") as content:
+        begin = content.read(200)
+        content.seek(max(file.stat().st_size - 200, 0))
+        whole = b"<VTKFile" in begin and content.read().rstrip().endswith(b"</VTKFile>")
+    return "" if whole else NO_MAP.format(file)
+
+
 def open_results(folder: Path) -> Finished:
     """Return a finished inspection.
 
@@ -109,13 +131,11 @@ def open_results(folder: Path) -> Finished:
 def _read(file: Path, name: str) -> FinishedMap:
     import pyvista
 
-    if not file.is_file():
-        raise InputError(f"{file} is missing: run the inspection again.")
-    content = file.read_bytes()  # VTK complains on standard error before it says that it cannot read
-    whole = b"<VTKFile" in content[:200] and content.rstrip().endswith(b"</VTKFile>")
-    polydata = pyvista.read(file) if whole else None
+    if words := _damage(file):
+        raise InputError(words)
+    polydata = pyvista.read(file)
     if not isinstance(polydata, pyvista.PolyData) or polydata.n_points == 0:
-        raise InputError(f"{file} is not a map of inspect3d: run the inspection again.")
+        raise InputError(NO_MAP.format(file))
     fields = {
         key: np.asarray(values, dtype=np.float64)
         for key, values in polydata.point_data.items()

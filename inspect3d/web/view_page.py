@@ -68,6 +68,11 @@ class View:
         return [Shown(finished, name) for finished in self.finished for name in finished.with_map]
 
     @property
+    def damaged(self) -> list[str]:
+        """Return what is wrong with maps that cannot be shown, a sentence each."""
+        return [words for finished in self.finished for words in finished.damaged.values()]
+
+    @property
     def page(self) -> Page:
         """Return the page for the server."""
         get = {"maps": self.maps, "map": self.map, "geometry": self.geometry, "lines": self.lines, "field": self.field}
@@ -238,11 +243,11 @@ def view_of(folders: Sequence[Path], recipe: Path | None) -> View:
     Raises
     ------
     InputError
-        A folder holds no inspection, none holds a map, or the recipe is wrong.
+        A folder holds no inspection, none holds a map that can be shown, or the recipe is wrong.
     """
     finished = [open_results(folder) for folder in folders]
-    if not any(each.with_map for each in finished):
-        finished[0].map()
+    if all(len(each.damaged) == len(each.with_map) for each in finished):
+        next((each for each in finished if each.with_map), finished[0]).map()
     if recipe is not None:
         load_recipe(recipe)
     return View(finished, recipe or _recipe_of(finished[0]))
