@@ -38,6 +38,7 @@ from inspect3d.report.verdict_words import verdict_words
 
 Rows = list[tuple[str, str]]
 VERDICTS = ("–", "conform", "undecided", "nonconform")
+SHARE_WORDS = {"unmeasured": "not measured, edges counted"}
 SHARE_COLOURS = (BAND_COLOURS[2], BAND_COLOURS[3], BAND_COLOURS[4], UNMEASURED)
 
 
@@ -164,7 +165,7 @@ def _shares(verdict: Mapping[str, float] | None) -> list[Block]:
     if verdict is None:
         return []
     shares = [
-        Share(100 * share, colour, f"{name} {number(100 * share, 1)} %")
+        Share(100 * share, colour, f"{SHARE_WORDS.get(name, name)} {number(100 * share, 1)} %")
         for (name, share), colour in zip(verdict.items(), SHARE_COLOURS, strict=True)
     ]
     return [Shares(tuple(shares))]
@@ -197,10 +198,7 @@ def _statistics(record: Record, part: MeasuredPart, figures: _Figures) -> list[B
 
 def _poses(part: MeasuredPart) -> list[Block]:
     failed = not part.status.has_map
-    return [
-        Folded(pose.title, (*([Paragraph(pose.words)] if pose.words else []), Code(pose.matrix)), failed)
-        for pose in poses(part)
-    ]
+    return [Folded(pose.title, (Code(pose.matrix),), failed) for pose in poses(part)]
 
 
 def _pose_uncertainty(part: MeasuredPart) -> list[Block]:
@@ -262,6 +260,6 @@ def _budget(record: Record, part: MeasuredPart) -> list[Block]:
 
 
 def _provenance(part: MeasuredPart) -> list[Block]:
-    seconds = " · ".join(f"{stage} {number(seconds, 2)} s" for stage, seconds in part.seconds.items())
+    seconds = " · ".join(f"{stage} {number(each, 1 if each > 1 else 2)} s" for stage, each in part.seconds.items())
     blocks: list[Block] = [Heading("How it was measured"), Code(part.provenance)]
     return blocks + ([Paragraph(seconds)] if seconds else [])

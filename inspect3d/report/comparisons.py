@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,10 +12,10 @@ from inspect3d.compare.agreement_words import LOOSE
 from inspect3d.compare.comparison import Comparison
 from inspect3d.record import Record
 from inspect3d.report.agreement_plot import draw_agreement
-from inspect3d.report.blocks import Block, Bullets, Cell, Chapter, Column, Heading, Link, Paragraph, Table, table_of
+from inspect3d.report.blocks import Block, Bullets, Cell, Chapter, Column, Heading, Link, Paragraph, Table
 from inspect3d.report.blocks import Picture as Shown
 from inspect3d.report.colours import ColourScale, deviation_scale, en_classes, en_scale, symmetric_limits
-from inspect3d.report.digits import grouped, number
+from inspect3d.report.digits import number
 from inspect3d.report.layout import Layout
 from inspect3d.report.matrix import draw_matrix
 from inspect3d.report.picture import Caption, Picture
@@ -68,10 +67,10 @@ def draw_comparisons(record: Record, folder: Path, views: Views, layout: Layout)
     for k, comparison in enumerate(record.comparisons, start=1):
         blocks += [
             Heading(f"{comparison.a} and {comparison.b}"),
-            Bullets(tuple(_typeset(words) for words in comparison.words)),
+            Bullets(comparison.words),
         ]
         if comparison.mean is not None:
-            blocks += [table_of(_figures(comparison)), *region_table(comparison.regions or ())]
+            blocks += region_table(comparison.regions or ())
             blocks += _draw(record, comparison, k, folder, views, layout)
     return Chapter(ANCHOR, "Comparison of the methods", tuple(blocks))
 
@@ -107,29 +106,25 @@ def _coverage(record: Record) -> list[Block]:
         ("none", ~seen.any(axis=0)),
     ]
     rows = tuple((name, _percent(float(areas[nodes].sum() / areas.sum()))) for name, nodes in shares)
-    return [Heading("Coverage"), Table(("Measured by", "Share of the area, edges apart"), rows, ("name", "number"))]
-
-
-def _figures(comparison: Comparison) -> list[tuple[str, str]]:
-    low, high = comparison.limits_of_agreement or (np.nan, np.nan)
     return [
-        ("nodes that both measured", grouped(comparison.nodes)),
-        ("mean difference", f"{_micro(comparison.mean)} µm"),
-        ("standard deviation of the difference", f"{_micro(comparison.std, sign=False)} µm"),
-        ("limits of agreement", f"{_micro(low)} to {_micro(high)} µm"),
-        ("correlation of the two maps", number(comparison.correlation, 3)),
-        ("E_n, root mean square", number(comparison.en_rms, 2)),
-        ("nodes with E_n above 1", _percent(comparison.en_above_1)),
+        Heading("Coverage"),
+        Table(("Measured by", "Share of the area, edges not counted"), rows, ("name", "number")),
     ]
+
+
+def _figures(comparison: Comparison) -> str:
+    """Return the figures below the title of a picture."""
+    low, high = comparison.limits_of_agreement or (np.nan, np.nan)
+    std = _micro(comparison.std, sign=False)
+    limits = f"limits of agreement {_micro(low)} to {_micro(high)} µm"
+    return f"mean {_micro(comparison.mean)} µm · standard deviation {std} µm · {limits}"
 
 
 def _draw(record: Record, comparison: Comparison, k: int, folder: Path, views: Views, layout: Layout) -> list[Block]:
     mesh, title = record.nominal.mesh, record.recipe.part.name
     pair = f"{comparison.a} minus {comparison.b}"
     viewpoints = _seen(record, views, comparison.common)[:SEEN]
-    caption = Caption(
-        title, f"{pair}: difference of the deviations", " · ".join(map(" ".join, _figures(comparison)[1:4]))
-    )
+    caption = Caption(title, f"{pair}: difference of the deviations", _figures(comparison))
     common = comparison.common
     scale = deviation_scale(symmetric_limits(comparison.difference[common], mesh.areas[common]))
     scale = scale.renamed("Difference", "mm")
@@ -154,11 +149,6 @@ def _draw(record: Record, comparison: Comparison, k: int, folder: Path, views: V
 
 def _seen(record: Record, views: Views, nodes: np.ndarray) -> tuple[Viewpoint, ...]:
     return views.showing(nodes, record.nominal.mesh.areas)
-
-
-def _typeset(words: str) -> str:
-    """Return a sentence with true minus signs before its figures."""
-    return re.sub(r"(?<![\w-])-(?=\d)", "−", words)
 
 
 def _micro(length: float | None, sign: bool = True) -> str:

@@ -30,10 +30,11 @@ def draw_figure(file: Path, figure: Figure, title: str, subject: str, layout: La
     layout : of the sheet
     """
     canvas = Canvas(layout.width, layout.height)
-    Caption(title, f"{subject}: {figure.words[0].lower()}{figure.words[1:]}").write(canvas)
+    below = _stages(figure) if isinstance(figure, Descent) else ""
+    Caption(title, f"{subject}: {figure.words[0].lower()}{figure.words[1:]}", below).write(canvas)
     u = canvas.unit
     if isinstance(figure, Descent):
-        _draw_descent(canvas, figure, (190 * u, 170 * u, layout.width - 60 * u, layout.height - 60 * u))
+        _draw_descent(canvas, figure, (190 * u, 190 * u, layout.width - 60 * u, layout.height - 60 * u))
     elif isinstance(figure, PixelMap):
         box = _draw_grey(canvas, figure.grey, PALEST, _within(canvas, figure.grey.shape, 290 * u))
         _draw_map(canvas, figure, box)
@@ -120,15 +121,24 @@ def _draw_descent(canvas: Canvas, figure: Descent, box: Box) -> None:
         above = top + row * (height + gap)
         _draw_curve(canvas, label, values, color, (left, above, right, above + height))
     start = 0
-    for number, (words, steps) in enumerate(groupby(figure.stages)):
+    for number, (_, steps) in enumerate(groupby(figure.stages), start=1):
         end = start + len(list(steps))
         x = left + start / max(count, 1) * (right - left)
-        if number:
+        if number > 1:
             canvas.line([x, x], [top, bottom], width=1, color=PALE, linestyle=":")
-        width = (end - start) / max(count, 1) * (right - left)
-        canvas.fitted(x + 6 * u, top - 18 * u, words, 17, max(width - 8 * u, 60 * u), color=PALE)
+        canvas.text(x + 6 * u, top - 6 * u, str(number), 24, color=PALE, va="bottom")
         start = end
     canvas.text((left + right) / 2, bottom + 38 * u, "Step", 26, ha="center")
+
+
+def _stages(figure: Descent) -> str:
+    """Return the stages of a descent by their numbers; those that differ in their last word only are told once."""
+    told, before = [], ""
+    for number, (words, _) in enumerate(groupby(figure.stages), start=1):
+        what, _, rest = words.partition(", ")
+        told.append(f"{number} {rest if rest and what == before else words}")
+        before = what
+    return " · ".join(told)
 
 
 def _draw_curve(canvas: Canvas, label: str, values: Floats, color: str, box: Box) -> None:

@@ -91,7 +91,9 @@ def spread_scale(record: Record, part: MeasuredPart) -> ColourScale:
 
 def _draw_part(record: Record, folder: Path, views: Views) -> Shown:
     mesh = record.nominal.mesh
-    viewpoint = views.overview(mesh.areas)
+    maps = [part.deviation for part in record.parts if part.deviation is not None]
+    measured = np.any([found.observed for found in maps], axis=0) if maps else np.zeros(len(mesh), bool)
+    viewpoint = views.overview(np.where(measured, mesh.areas, 0.0) if measured.any() else mesh.areas)
     size = " × ".join(number(length, 1) for length in np.ptp(mesh.nodes, axis=0))
     edge = number(mesh.edge_length, 2)
     caption = Caption(

@@ -9,20 +9,20 @@ import numpy as np
 from inspect3d.outcome import Status
 from inspect3d.record import MeasuredPart
 from inspect3d.register.alignment import Alignment
-from inspect3d.report.digits import grouped, number, significant
+from inspect3d.report.digits import decimals, grouped, number, significant
 from inspect3d.report.results import candidates
 
 MOTIONS = ("turn about x", "turn about y", "turn about z", "shift along x", "shift along y", "shift along z")
-NEGLIGIBLE = 1e-12
-"""Standard uncertainty, rad or mm, below which a motion was held."""
+NEGLIGIBLE = 1e-3
+"""Share of the largest standard uncertainty of its kind, turn or shift, below which a motion was held: what is left
+comes from rounding and from axes that are not quite its own."""
 
 
 @dataclass(frozen=True)
 class PoseWords:
-    """A pose to show: its title, a sentence, and its matrix as a recipe takes it."""
+    """A pose to show: its title, and its matrix as a recipe takes it."""
 
     title: str
-    words: str
     matrix: str
 
 
@@ -32,15 +32,13 @@ def poses(part: MeasuredPart) -> tuple[PoseWords, ...]:
     if part.status.has_map:
         for k, alignment in enumerate(part.alignments, start=1):
             of_file = f" of file {k}" if len(part.alignments) > 1 else ""
-            found.append(
-                PoseWords(f"Pose{of_file}: CAD from measured", "", _matrix(alignment.cad_from_measured.matrix))
-            )
+            found.append(PoseWords(f"Pose{of_file}: CAD from measured", _matrix(alignment.cad_from_measured.matrix)))
     others = 1 if part.status.has_map else 0
     for k, candidate in enumerate(candidates(part)[others:], start=others + 1):
         residual = significant(candidate.residual, 3)
         scale = f", scale {candidate.scale:.6g}" if candidate.scale != 1 else ""
-        words = f"Pose {k} of those considered, best first: robust residual {residual} mm{scale}."
-        found.append(PoseWords(f"Candidate {k}, residual {residual} mm", words, _matrix(candidate.pose.matrix)))
+        title = f"Candidate {k}: robust residual {residual} mm{scale}"
+        found.append(PoseWords(title, _matrix(candidate.pose.matrix)))
     return tuple(found)
 
 
@@ -49,8 +47,9 @@ def motions(alignment: Alignment) -> list[tuple[str, str]]:
     sigma = np.sqrt(np.maximum(np.diag(alignment.covariance), 0.0))
     rows = []
     for k, (name, size) in enumerate(zip(MOTIONS, sigma.tolist(), strict=True)):
-        figure = f"{significant(np.degrees(size), 2)}°" if k < 3 else f"{significant(1000 * size, 2)} µm"
-        rows.append((name, figure if size > NEGLIGIBLE else "held"))
+        shown, unit = (np.degrees(size), "°") if k < 3 else (1000 * size, " µm")
+        held = size <= NEGLIGIBLE * sigma[3 * (k // 3) : 3 * (k // 3) + 3].max()
+        rows.append((name, "held" if held else f"{number(shown, decimals(shown))}{unit}"))
     return rows
 
 

@@ -16,7 +16,7 @@ from inspect3d.report.blocks import Bullets, Chapter, Heading, Paragraph, Pictur
 from inspect3d.report.canvas import INK, PALE, Canvas
 from inspect3d.report.colours import rounded_up
 from inspect3d.report.compass import round_length
-from inspect3d.report.digits import COVERAGE, number
+from inspect3d.report.digits import COVERAGE, measured, number
 from inspect3d.report.layout import Layout
 from inspect3d.report.picture import Caption
 from inspect3d.report.plot import Plot
@@ -141,8 +141,8 @@ def _draw_profiles(plot: Plot, cut: _Cut, curves: Sequence[_Curve], factor: floa
             value, sigma = (each[:, None] for each in curve.pieces[position])
             low, high = nominal + (value - COVERAGE * sigma) * outward, nominal + (value + COVERAGE * sigma) * outward
             _fill(plot, low, high, curve.colour)
-            measured = nominal + value * outward
-            plot.line(measured[:, 0], measured[:, 1], curve.colour, 2.4)
+            curved = nominal + value * outward
+            plot.line(curved[:, 0], curved[:, 1], curve.colour, 2.4)
 
 
 def _draw_unrolled(plot: Plot, cut: _Cut, curves: Sequence[_Curve]) -> None:
@@ -211,5 +211,5 @@ def _sentence(cut: _Cut, part: MeasuredPart) -> str:
         return f"{part.name}: nothing was measured along this section."
     low, high = int(np.nanargmin(value)), int(np.nanargmax(value))
     share = number(100 * float(seen.mean()), 0)
-    ends = " to ".join(f"{number(value[k], 4, sign=True)} ± {number(COVERAGE * sigma[k], 4)}" for k in (low, high))
-    return f"{part.name}: {ends} mm (± U, k = 2), {share} % of the profile measured."
+    ends = " to ".join(measured(float(value[k]), float(sigma[k])) for k in (low, high))
+    return f"{part.name}: {ends} (± U, k = 2), {share} % of the profile measured."

@@ -12,6 +12,8 @@ from inspect3d.report.digits import COVERAGE, grouped, measured, number, signifi
 
 MOST = 12
 """Regions that are listed."""
+LEAST = 0.001
+"""Probability below which the draws of the test do not tell how small it is."""
 
 
 def region_table(regions: Sequence[DeviationRegion]) -> list[Block]:
@@ -20,7 +22,7 @@ def region_table(regions: Sequence[DeviationRegion]) -> list[Block]:
         return []
     tested = any(region.p_value is not None for region in regions)
     last = "Probability by chance" if tested else "Mean over its uncertainty"
-    head = ("Region at (x, y, z), mm", "Area, mm²", "Largest, µm", "Mean ± U (k = 2)", last)
+    head = ("Region at (x, y, z), mm", "Area, mm²", "Largest, µm", "Mean ± U (k = 2), µm", last)
     rows = tuple(_region(region, tested) for region in regions[:MOST])
     blocks: list[Block] = [Table(head, rows, ("text", "number", "number", "number", "number"))]
     if len(regions) > MOST:
@@ -55,9 +57,11 @@ def resolved(parts: Sequence[MeasuredPart]) -> list[Block]:
 
 def _region(region: DeviationRegion, tested: bool) -> tuple[Cell, ...]:
     place = ", ".join(number(float(x), 1) for x in region.place)
-    mean = _micro(region.mean) + " µm" if region.sigma is None else measured(region.mean, region.sigma)
-    last = region.p_value if tested else region.significance
-    return (place, number(region.area, 1), _micro(region.height), mean, significant(last, 2))
+    mean = _micro(region.mean) if region.sigma is None else measured(1000 * region.mean, 1000 * region.sigma, "")
+    last = significant(region.p_value if tested else region.significance, 2)
+    if region.p_value is not None and region.p_value < LEAST:
+        last = f"< {LEAST:g}"
+    return (place, number(region.area, 1), _micro(region.height), mean, last)
 
 
 def _feature(feature: FeatureEstimate) -> tuple[Cell, ...]:

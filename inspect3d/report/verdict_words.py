@@ -48,7 +48,7 @@ def whole_verdict(record: Record) -> VerdictWords:
         return found
     verdicts = np.stack([np.asarray(part.verdict) for part in judged])
     torn = (verdicts == NONCONFORM).any(axis=0) & (verdicts == CONFORM).any(axis=0)
-    words = f"{found.words} So it is by {_listed(failing)}."
+    words = f"{found.words} Found nonconform by {_listed(failing)}."
     if torn.any():
         share = _share(record.nominal.mesh.areas, torn, record.nominal.mesh.areas.sum())
         words += f" {share} of the area is nonconform by one measurement and conform by another: one of them is wrong."
@@ -70,18 +70,19 @@ def _verdict(record: Record, parts: Sequence[MeasuredPart]) -> VerdictWords:
         return VerdictWords("none", "no tolerance", "The recipe states no tolerance, so there is no verdict.")
     verdict, judged = _together(np.stack(verdicts)), np.isfinite(limits).all(axis=1)
     whole = mesh.areas[judged].sum() or 1.0
+    undecided, unseen = verdict == UNDECIDED, judged & (verdict == NONE) & ~mesh.crease
+    doubts = []
+    if undecided.any():
+        doubts.append(f"{_share(mesh.areas, undecided, whole)} of the area lies too near to a limit to decide.")
+    if unseen.any():
+        doubts.append(f"{_share(mesh.areas, unseen, whole)} of the area, edges not counted, was not measured.")
     if (verdict == NONCONFORM).any():
         share = _share(mesh.areas, verdict == NONCONFORM, whole)
         words = f"{share} of the area lies outside the tolerance, its uncertainty considered."
-        return VerdictWords("nonconform", "nonconform", words)
-    undecided, unseen = verdict == UNDECIDED, judged & (verdict == NONE) & ~mesh.crease
-    if undecided.any() or unseen.any():
-        doubts = ["Nothing lies outside the tolerance, but conformity has not been shown."]
-        if undecided.any():
-            doubts.append(f"{_share(mesh.areas, undecided, whole)} of the area lies too near to a limit to decide.")
-        if unseen.any():
-            doubts.append(f"{_share(mesh.areas, unseen, whole)} of the area, apart from edges, was not measured.")
-        return VerdictWords("undecided", "not shown to conform", " ".join(doubts))
+        return VerdictWords("nonconform", "nonconform", " ".join([words, *doubts]))
+    if doubts:
+        words = "Nothing lies outside the tolerance, but conformity has not been shown."
+        return VerdictWords("undecided", "not shown to conform", " ".join([words, *doubts]))
     return VerdictWords("conform", "conform", "All of the area lies within the tolerance, its uncertainty considered.")
 
 

@@ -61,7 +61,7 @@ class Views:
             yield window
 
     def overview(self, areas: Floats) -> Viewpoint:
-        """Return the corner of the surrounding cube from which most of the part is seen."""
+        """Return the corner of the surrounding cube from which most of the given areas (n,) mm² is seen."""
         seen = (self.cosine @ self._gathered(areas)) * [
             np.count_nonzero(np.abs(view.direction) > 0.1) == 3 for view in self.viewpoints
         ]
