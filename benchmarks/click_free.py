@@ -25,7 +25,8 @@ from inspect3d.correlation.start import CENTRE, DISTORTION, ROUGH
 from inspect3d.outcome import MeasurementError
 from inspect3d.pose import Pose
 from inspect3d.register.symmetry import surface_points
-from inspect3d.starting.finder import FindStart, Pictured
+from inspect3d.starting.finder import FindStart
+from inspect3d.starting.shown import Pictured
 
 NEAR = 6.0  # px, within which a start is in the basin of the correlation, whose first blur is as wide
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from inspect3d.virtual.stereo_rig import StereoRig
 from inspect3d.virtual.virtual_camera import VirtualCamera
 
 SIZE = (1224, 1024)
+FILLED = 0.3, 0.9  # share of a picture that the part takes along the side where it is largest
 DOT = 5.0  # px, diameter of a dot of the speckle
 WIDEST_TILT = 40.0  # degrees, of an open sheet, which has one side only
 FORM = Sum((Wave(0.03, (0.009, 0.004, 0.003), 0.3), Wave(0.02, (-0.005, 0.012, 0.006), 1.9)))
@@ -98,7 +99,7 @@ def random_scene(seed: int) -> RandomScene:
     part = tuple(PARTS)[seed % len(PARTS)]
     shape = surface(part)
     cameras, angle = int(random.integers(2, 5)), np.radians(random.uniform(15, 45))
-    true, fill = random.uniform(2500, 6000), random.uniform(0.3, 0.9)
+    true, fill = random.uniform(2500, 6000), random.uniform(*FILLED)
     toward = unit(random.normal(size=3))
     if part == "freeform":
         tilt, turn = np.radians(WIDEST_TILT) * np.sqrt(random.random()), random.uniform(0, 2 * np.pi)
@@ -112,6 +113,10 @@ def random_scene(seed: int) -> RandomScene:
     target = (low + high) / 2 @ np.stack([np.cross(up, toward), up]) + (along.min() + along.max()) / 2 * toward
     rig = StereoRig(cameras, angle, scale, true, SIZE, toward=tuple(toward), up=tuple(up), offset=3.0, spread=0.002)
     views = rig(target, seed)
+    largest = max(_filled(view, corners) for view in views)
+    if largest > FILLED[1]:  # one camera stands closer to an end of the part than the rig to its middle
+        scale *= FILLED[1] / largest
+        views = replace(rig, scale=scale)(target, seed)
     scene = Scene(shape, FORM, Speckle(dot=DOT / scale, seed=seed))
     grey = []
     for k, view in enumerate(views):
@@ -119,3 +124,8 @@ def random_scene(seed: int) -> RandomScene:
         grey.append(VirtualCamera(view, sensor=sensor)(scene, 10 * seed + k).astype(np.float64))
     element = max(2.5, 4 * DOT / scale)
     return RandomScene(part, views, tuple(grey), true * random.uniform(0.95, 1.05), element, FORM)
+
+
+def _filled(view: View, corners: Floats) -> float:
+    """Return the share of a picture that points (n, 3) mm take along the side where they take most."""
+    return float(np.max(np.ptp(view.project(corners), axis=0) / np.array(SIZE)))

@@ -9,6 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from inspect3d.arrays import Floats, floats
 
+UNIT = np.eye(3)
+ADMITTED = 1e-6 + 1e-5 * UNIT  # by how much R R' may differ from it
+EXACT = 2e-15  # and by how much the rotation is not replaced by the nearest proper one
+
 
 @dataclass(frozen=True, eq=False)
 class Pose:
@@ -25,10 +29,13 @@ class Pose:
 
     def __post_init__(self) -> None:
         rotation = floats(self.rotation, "rotation", 3, 3)
-        if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6) or np.linalg.det(rotation) < 0:
+        off = np.abs(rotation @ rotation.T - UNIT)
+        if (off > ADMITTED).any() or np.linalg.det(rotation) < 0:
             raise ValueError("the rotation of a pose is not a proper rotation matrix")
-        u, _, vt = np.linalg.svd(rotation)
-        object.__setattr__(self, "rotation", floats(u @ vt, "rotation", 3, 3))
+        if off.max() > EXACT:
+            u, _, vt = np.linalg.svd(rotation)
+            rotation = floats(u @ vt, "rotation", 3, 3)
+        object.__setattr__(self, "rotation", rotation)
         object.__setattr__(self, "translation", floats(self.translation, "translation", 3))
 
     @classmethod

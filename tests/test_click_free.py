@@ -14,8 +14,9 @@ from inspect3d.outcome import InputError, MeasurementError, Status
 from inspect3d.pose import Pose
 from inspect3d.register.similarity import Similarity
 from inspect3d.starting.bundle import Bundle, adjusted
-from inspect3d.starting.finder import FindStart, Pictured
+from inspect3d.starting.finder import FindStart
 from inspect3d.starting.relative import relative, triangulated
+from inspect3d.starting.shown import Pictured
 from inspect3d.virtual.deviation_field import Sum, Wave
 from inspect3d.virtual.part import Part
 from inspect3d.virtual.scene import Scene

@@ -18,7 +18,8 @@ from inspect3d.outcome import Status
 from inspect3d.pose import Pose
 from inspect3d.register.alignment import Candidate, NoAlignmentError
 from inspect3d.starting.answer import Answer, Trial
-from inspect3d.starting.finder import FindStart, Pictured
+from inspect3d.starting.finder import FindStart
+from inspect3d.starting.shown import Pictured
 
 UNMARKED = np.zeros((0, 2))
 MAD = 1.4826

@@ -42,6 +42,7 @@ class Trial:
     fit : cameras and points on the CAD
     agreement : of the pictures on the nominal surface
     unlike : share of the part that would appear beside the texture, and of the features beside the part
+    outlined : share of the part's outline that the pictures show where it should be
     explained : share of the points before the CAD that lie on it
     count : of the points that lie on it
     """
@@ -49,6 +50,7 @@ class Trial:
     fit: Fitted
     agreement: Agreement
     unlike: float
+    outlined: float
     explained: float
     count: int
 
@@ -65,7 +67,7 @@ class Trial:
     @property
     def merit(self) -> float:
         """Return what speaks for the start as one number, 0 to 1."""
-        return self.explained * self.agreement.share * max(1 - self.unlike, 0.0)
+        return self.explained * self.agreement.share * max(1 - self.unlike, 0.0) * (1 + self.outlined) / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +103,11 @@ def answer(trials: Sequence[Trial], smooth: Smooth, unlike: Callable[[Sequence[V
         return Answer((), False, best)
     kept: list[Trial] = []
     for trial in ranked:
-        behind = best.agreement.share - trial.agreement.share, trial.unlike - best.unlike
+        behind = (
+            best.agreement.share - trial.agreement.share,
+            trial.unlike - best.unlike,
+            best.outlined - trial.outlined,
+        )
         unexplained = best.explained - trial.explained
         if max(behind) < WORSE and unexplained < MISSING and all(_apart(trial, other, smooth) for other in kept):
             kept.append(trial)

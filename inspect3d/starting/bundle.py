@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
-from inspect3d.arrays import Booleans, Floats
+from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
 from inspect3d.pose import Pose
@@ -31,6 +32,25 @@ class Planes:
 
     feet: Floats
     normals: Floats
+    sigma: float
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Lines of the pictures, nearly, on which points of the CAD should appear: the outline of the part.
+
+    Parameters
+    ----------
+    points : (n, 3) mm, held
+    views : (n,), the camera of each
+    pixels, outward : (n, 2) px, a point of the line, and its unit normal
+    sigma : px, standard uncertainty of a line's place
+    """
+
+    points: Floats
+    views: Integers
+    pixels: Floats
+    outward: Floats
     sigma: float
 
 
@@ -80,6 +100,18 @@ class Bundle:
             found[part, k] = np.linalg.norm(view.project(self.points[part]) - self.pixels[part, k], axis=1)
         return found
 
+    @property
+    def widest(self) -> Floats:
+        """Return the largest angle between two lines of sight of each point, (n,) rad."""
+        widest = np.zeros(len(self.points))
+        sights = np.stack([view.centre - self.points for view in self.views], axis=1)
+        sights /= np.linalg.norm(sights, axis=2, keepdims=True)
+        for one, other in combinations(range(len(self.views)), 2):
+            both = self.seen[:, one] & self.seen[:, other]
+            cosine = np.clip((sights[:, one] * sights[:, other]).sum(axis=1), -1, 1)
+            widest[both] = np.maximum(widest[both], np.arccos(cosine[both]))
+        return widest
+
     def chosen(self, which: Booleans) -> Bundle:
         """Return the same cameras with some of the points."""
         return replace(self, points=self.points[which], pixels=self.pixels[which])
@@ -111,11 +143,18 @@ class Adjusted:
 
 
 def adjusted(
-    bundle: Bundle, freedom: Freedom, noise: float, planes: Planes | None = None, steps: int = 20, firm: float = FIRM
+    bundle: Bundle,
+    freedom: Freedom,
+    noise: float,
+    planes: Planes | None = None,
+    steps: int = 20,
+    firm: float = FIRM,
+    lines: Lines | None = None,
 ) -> Adjusted:
-    """Return the bundle that fits pixels, priors and planes best, by Levenberg-Marquardt with the points eliminated.
+    """Return the bundle that fits pixels, priors, planes and lines best.
 
-    A point is weighted down the more, the farther it appears from where it was found (Geman and McClure's weights).
+    By Levenberg-Marquardt with the points eliminated. A point is weighted down the more, the farther it appears from
+    where it was found, and a line from where it should be (Geman and McClure's weights).
 
     Parameters
     ----------
@@ -127,12 +166,12 @@ def adjusted(
     B. Triggs and others, "Bundle adjustment: a modern synthesis", Vision Algorithms: Theory and Practice, 2000.
     """
     damping = firm
-    parts = _normal(bundle, freedom, noise, planes, damping)
+    parts = _normal(bundle, freedom, noise, planes, lines, damping)
     for _ in range(steps):
         moved, then = bundle, parts
         for _ in range(TRIES):
             moved = _moved(bundle, freedom, parts, damping)
-            then = _normal(moved, freedom, noise, planes, max(damping / 10, firm))
+            then = _normal(moved, freedom, noise, planes, lines, max(damping / 10, firm))
             if then.cost <= parts.cost:
                 break
             damping = max(10 * damping, STIFF)
@@ -155,8 +194,11 @@ class _Parts:
     cost: float
 
 
-def _normal(bundle: Bundle, freedom: Freedom, noise: float, planes: Planes | None, damping: float) -> _Parts:
+def _normal(
+    bundle: Bundle, freedom: Freedom, noise: float, planes: Planes | None, lines: Lines | None, damping: float
+) -> _Parts:
     from inspect3d.starting.bundle_kernel import CHANGES, accumulate
+    from inspect3d.starting.contour_kernel import accumulate_outline
 
     spread, sigmas = freedom.spread(np.arange(CHANGES))
     n, size = len(bundle.points), CHANGES * len(bundle.views)
@@ -168,6 +210,11 @@ def _normal(bundle: Bundle, freedom: Freedom, noise: float, planes: Planes | Non
         bundle.rig, freedom.origin, bundle.points, bundle.pixels, bundle.seen, noise,
         (feet, normals), sigma, damping, normal, right, own, folded,
     )  # fmt: skip
+    if lines is not None:
+        cost += accumulate_outline(
+            bundle.rig, freedom.origin, lines.points, lines.views, lines.pixels, lines.outward, lines.sigma,
+            normal, right,
+        )  # fmt: skip
     offset = freedom.offset(bundle.views)
     cost += float(((offset / sigmas) ** 2).sum())
     normal = spread.T @ normal @ spread + np.diag(1 / sigmas**2)

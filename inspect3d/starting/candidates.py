@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from inspect3d.arrays import Floats
 from inspect3d.camera import View
 from inspect3d.nominal.surface import Surface
+from inspect3d.pose import Pose
 from inspect3d.register.field import Field
 from inspect3d.register.search import PoseSearch, distinct
 from inspect3d.register.similarity import Similarity
@@ -74,7 +76,7 @@ class Candidates:
         places = distinct(ranked(places), cloud.points, APART * size)
         for share in ROUNDS:
             top = places[:SHAKEN]
-            shaken = [_shaken(each, cloud.points, share * size, random, scaled) for each in top for _ in range(SHAKES)]
+            shaken = [moved for each in top for moved in _shaken(each, cloud.points, share * size, random, scaled)]
             places = distinct(ranked([*top, *shaken]), cloud.points, share * size)
         return distinct(places, cloud.points, APART * size)[: self.kept]
 
@@ -88,10 +90,18 @@ class Candidates:
         )  # fmt: skip
 
 
-def _shaken(place: Similarity, points: Floats, size: float, random: np.random.Generator, scaled: bool) -> Similarity:
-    """Return the place moved by about `size` mm at random."""
-    centre = place(points.mean(axis=0)[None])[0]
-    length = place.scale * float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))
-    motion = size * random.normal(size=7) / np.array([length, length, length, 1.0, 1.0, 1.0, length])
-    motion[6] = np.clip(motion[6], -MOST_GROWTH, MOST_GROWTH)
-    return Similarity.small(motion[:6] if scaled else motion, centre) @ place
+def _shaken(
+    place: Similarity, points: Floats, size: float, random: np.random.Generator, scaled: bool
+) -> list[Similarity]:
+    """Return the place moved by about `size` mm at random, `SHAKES` times."""
+    middle = points.mean(axis=0)
+    centre = place(middle[None])[0]
+    length = place.scale * float(np.sqrt(((points - middle) ** 2).sum(axis=1).mean()))
+    motions = size * random.normal(size=(SHAKES, 7)) / np.array([length, length, length, 1.0, 1.0, 1.0, length])
+    growths = 1.0 + np.zeros(SHAKES) if scaled else 1.0 + np.clip(motions[:, 6], -MOST_GROWTH, MOST_GROWTH)
+    turns = Rotation.from_rotvec(motions[:, :3]).as_matrix() @ place.pose.rotation
+    shifts = centre + motions[:, 3:6] - (growths * place.scale)[:, None] * (turns @ middle)
+    return [
+        Similarity(Pose(turn, shift), place.scale * growth)
+        for turn, shift, growth in zip(turns, shifts, growths.tolist(), strict=True)
+    ]

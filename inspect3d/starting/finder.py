@@ -11,10 +11,9 @@ from os import cpu_count
 import numpy as np
 from scipy.spatial import cKDTree
 
-from inspect3d.arrays import Booleans, Floats, unit
+from inspect3d.arrays import Floats, unit
 from inspect3d.camera import Camera, View
 from inspect3d.correlation.freedom import Freedom, Lens
-from inspect3d.correlation.picture import Pictures, Stack
 from inspect3d.measure import Cloud
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
@@ -23,17 +22,18 @@ from inspect3d.progress import running
 from inspect3d.register.field import Field
 from inspect3d.register.similarity import Similarity
 from inspect3d.register.smooth import Smooth
-from inspect3d.register.symmetry import surface_points
 from inspect3d.register.thinned import thinned
 from inspect3d.starting.agreement import agreement
 from inspect3d.starting.answer import Answer, Trial, answer, explained
 from inspect3d.starting.bundle import Bundle
 from inspect3d.starting.candidates import Candidates
+from inspect3d.starting.contour import Contours
 from inspect3d.starting.features import Features, features
 from inspect3d.starting.fitting import FINAL, Fitted, fitted
-from inspect3d.starting.outlined import Outline, weak_motions
-from inspect3d.starting.relative import relative, triangulated
-from inspect3d.starting.texture import Texture
+from inspect3d.starting.further import with_further
+from inspect3d.starting.outlined import weak_motions
+from inspect3d.starting.relative import joined, relative, triangulated
+from inspect3d.starting.shown import Pictured, Shown
 from inspect3d.starting.tracks import tracks
 
 NOISE = 0.3  # px of the reduced pictures, of a feature's place
@@ -41,26 +41,6 @@ CLOUD = 900  # points that stand for all where the part is searched
 TRIED = 4  # places that are fitted to the outline and compared
 FLAT = 3  # weak motions, from which on points lie on one flat face only
 STRIDE = 2  # of them, every so many-th is fitted
-BLUR = 1.5  # px of the reduced pictures, in which patches are compared
-OUTLINE = 1500  # points over the part by which its outline is judged
-
-
-@dataclass(frozen=True, eq=False)
-class Pictured:
-    """A picture and what is known of its camera.
-
-    Parameters
-    ----------
-    grey : (rows, columns) grey levels
-    mask : (rows, columns), where the picture may be used, or None
-    camera : the lens, perhaps a rough one
-    lens : how well it is known
-    """
-
-    grey: Floats
-    mask: Booleans | None
-    camera: Camera
-    lens: Lens
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,25 +77,31 @@ class FindStart:
         progress.update(0.0, "looking for features")
         found = self._features(pictured)
         progress.update(0.3, "matching features")
-        step = max(each.step for each in found)
-        noise = NOISE * step
+        noise = NOISE * max(each.step for each in found)
         pixels = self._tracks(pictured, found)
         progress.update(0.45, "placing the cameras relative to each other")
+        contours = Contours(self.nominal.surface)
+        whole = Shown.of(pictured, found, contours)
+        placed, shown = tuple(range(len(pictured))), whole
         if rig:
             bundles: tuple[Bundle, ...] = (triangulated(rig, pixels, noise),)
         else:
-            cameras, lenses = [each.camera for each in pictured], [each.lens for each in pictured]
-            bundles = tuple(self._resized(each) for each in relative(cameras, lenses, pixels, noise))
-        sizes = [each.camera.size for each in pictured]
-        texture = Texture.of(found, sizes)
-        outline = Outline.of(found, sizes, surface_points(self.nominal.surface, OUTLINE)[0])
-        stack = Pictures([each.grey for each in pictured]).blurred(BLUR * step)
+            placed = tuple(sorted(joined(pixels)))
+            if len(placed) < len(pictured):
+                shown = Shown.of([pictured[k] for k in placed], [found[k] for k in placed], contours)
+            common = pixels[:, placed]
+            common = common[np.isfinite(common[:, :, 0]).sum(axis=1) >= 2]
+            bundles = tuple(self._resized(each) for each in relative(shown.cameras, shown.lenses, common, noise))
         answers = []
         for k, bundle in enumerate(bundles):
             progress.update(0.55 + 0.4 * k / len(bundles), "searching the part")
-            answers.append(self._answer(bundle, pictured, bool(rig), cad_from_first, texture, outline, stack, noise))
+            answers.append(self._answer(bundle, shown, bool(rig), cad_from_first, noise))
+        said = max(answers, key=lambda each: (bool(each.trials), each.best.count * each.best.agreement.share))
+        if shown is not whole:
+            progress.update(0.95, "placing further cameras")
+            said = self._completed(said, placed, whole, pixels, noise)
         progress.update(1.0, "searching the part")
-        return max(answers, key=lambda each: (bool(each.trials), each.best.count * each.best.agreement.share))
+        return said
 
     @cached_property
     def _smooth(self) -> Smooth:
@@ -143,17 +129,7 @@ class FindStart:
         scale = self.nominal.diagonal / float(np.linalg.norm(high - low))
         return bundle.placed(Similarity(Pose.identity(), scale))
 
-    def _answer(
-        self,
-        bundle: Bundle,
-        pictured: Sequence[Pictured],
-        scaled: bool,
-        cad_from_first: Pose | None,
-        texture: Texture,
-        outline: Outline,
-        stack: Stack,
-        noise: float,
-    ) -> Answer:
+    def _answer(self, bundle: Bundle, shown: Shown, scaled: bool, cad_from_first: Pose | None, noise: float) -> Answer:
         toward = unit(np.mean([view.centre for view in bundle.views], axis=0) - bundle.points)
         cloud = thinned(Cloud("the pictures", bundle.points, toward), CLOUD)
         few = cloud.every(STRIDE)
@@ -161,38 +137,40 @@ class FindStart:
         if cad_from_first is not None:
             places = [self._scaled(bundle, cad_from_first)]
         else:
-            places = Candidates(self.nominal.surface, self._field)(cloud, bundle.views, texture, scaled)
-        freedom = _Free(tuple(each.camera for each in pictured), tuple(each.lens for each in pictured), scaled)
-        masks = [each.mask for each in pictured]
-        surface = self.nominal.surface
+            places = Candidates(self.nominal.surface, self._field)(cloud, bundle.views, shown.texture, scaled)
+        freedom = _Free(shown.cameras, shown.lenses, scaled)
+        surface, outline = self.nominal.surface, shown.outline
         fits = [fitted(part.placed(each), each.turned(few.normals), surface, freedom, noise) for each in places]
         merits = [explained(fit, surface)[0] * (1 - outline.unlike(fit.bundle.views, surface)) for fit in fits]
         best = np.argsort(merits)[::-1][:TRIED]
-        trials = [
-            self._trial(fits[k], places[k].turned(few.normals), freedom, outline, stack, masks, noise) for k in best
-        ]
+        trials = [self._trial(fits[k], places[k].turned(few.normals), freedom, shown, noise) for k in best]
         first = max(trials, key=lambda trial: trial.merit)
         for turned in _turned_about(first.fit, scaled):
             fit = fitted(turned.bundle, turned.normals, surface, freedom, noise, FINAL)
-            trials.append(self._trial(fit, turned.normals, freedom, outline, stack, masks, noise))
+            trials.append(self._trial(fit, turned.normals, freedom, shown, noise))
         return answer(trials, self._smooth, lambda views: outline.unlike(views, surface))
 
-    def _trial(
-        self,
-        fit: Fitted,
-        normals: Floats,
-        freedom: _Free,
-        outline: Outline,
-        stack: Stack,
-        masks: Sequence[Booleans | None],
-        noise: float,
-    ) -> Trial:
+    def _trial(self, fit: Fitted, normals: Floats, freedom: _Free, shown: Shown, noise: float) -> Trial:
         surface = self.nominal.surface
-        bundle, unlike = outline.fitted(fit, surface, freedom.rigid)
-        if bundle is not fit.bundle:
-            fit = fitted(bundle, normals, surface, freedom, noise, FINAL)
+        bundle, _ = shown.outline.fitted(fit, surface, freedom.rigid)
+        fit = fitted(bundle, normals, surface, freedom, noise, FINAL, shown.outline.lines)
+        return self._judged(fit, shown)
+
+    def _judged(self, fit: Fitted, shown: Shown) -> Trial:
+        surface, views = self.nominal.surface, fit.bundle.views
         share, count = explained(fit, surface)
-        return Trial(fit, agreement(surface, fit.bundle.views, stack, masks), unlike, share, count)
+        agreed = agreement(surface, views, shown.stack, shown.masks)
+        return Trial(fit, agreed, shown.outline.unlike(views, surface), shown.outline.met(views), share, count)
+
+    def _completed(self, said: Answer, placed: Sequence[int], whole: Shown, pixels: Floats, noise: float) -> Answer:
+        """Return the answer with the cameras that had no place yet, as what they see of the CAD tells."""
+        surface, freedom = self.nominal.surface, _Free(whole.cameras, whole.lenses, False)
+        ends = {}
+        for trial in {id(each): each for each in (*said.trials, said.best)}.values():
+            lines = whole.outline.lines
+            fit = with_further(trial.fit, placed, whole.cameras, pixels, surface, freedom, noise, lines)
+            ends[id(trial)] = self._judged(fit, whole)
+        return Answer(tuple(ends[id(trial)] for trial in said.trials), said.symmetric, ends[id(said.best)])
 
     def _scaled(self, bundle: Bundle, cad_from_first: Pose) -> Similarity:
         """Return the place that a stated place of the first camera gives: its lines of sight tell the scale."""

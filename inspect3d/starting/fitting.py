@@ -11,12 +11,13 @@ from inspect3d.arrays import Booleans, Floats
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
 from inspect3d.nominal.surface import Feet, Surface
-from inspect3d.starting.bundle import Bundle, Planes, adjusted
+from inspect3d.starting.bundle import Bundle, Lines, Planes, adjusted
 
 WIDTHS = (0.02, 0.012, 0.008, 0.005, 0.003, 0.002, 0.001, 0.0007, 0.0005, 0.0005)
 """Shares of the CAD's diagonal that points may be off it, from the first fit to the last."""
 FINAL = WIDTHS[5:]
 OPPOSED = 0.3
+OUTLINE = 20.0  # times as far as points may be off the CAD, its outline may be off the picture's
 HELD = 1e-6  # damping of the adjustment, which keeps motions at rest that the points on the CAD leave free
 
 
@@ -48,6 +49,7 @@ def fitted(
     freedom: Callable[[tuple[View, ...]], Freedom],
     noise: float,
     widths: Sequence[float] = WIDTHS,
+    lines: Callable[[tuple[View, ...], float], Lines | None] | None = None,
 ) -> Fitted:
     """Return cameras and points fitted to the CAD, from coarse to fine.
 
@@ -62,6 +64,8 @@ def fitted(
     freedom : what may change about cameras at given places
     noise : px, of a feature's place
     widths : shares of the CAD's diagonal that points may be off it, from the first fit to the last
+    lines : where the outline of the part was found in the pictures, beside where cameras show it, within a share of the
+        CAD's diagonal
     """
     turned = normals
     for share in widths:
@@ -70,7 +74,8 @@ def fitted(
         usable = (there.distance < 4 * width)[:, None]
         planes = Planes(there.feet.points, np.where(usable, there.feet.normals, 0.0), width)
         before = bundle
-        bundle = adjusted(bundle, freedom(bundle.views), noise, planes, steps=4, firm=HELD).bundle
+        asked = lines(bundle.views, OUTLINE * share) if lines else None
+        bundle = adjusted(bundle, freedom(bundle.views), noise, planes, 4, HELD, asked).bundle
         turn = bundle.views[0].camera_from_cad.rotation.T @ before.views[0].camera_from_cad.rotation
         turned = turned @ turn.T
     return _on(bundle, turned, surface)

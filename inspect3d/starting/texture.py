@@ -18,6 +18,7 @@ CELLS = 160  # along the longer side of a picture
 Places = tuple[Floats, Floats, Floats]
 FINEST = 3.0  # px of the reduced picture, of a cell that shows the outline
 CLOSED = 4  # cells within which gaps of such are closed
+UNCLEAR = 0.2  # share of the cells across an outline that may contradict a step from texture to none
 AROUND = 2  # cells around a feature that count as textured
 
 
@@ -46,6 +47,32 @@ class Texture:
         spacings = [_spacing(each.pixels) for each in found]
         widths = tuple(max(FINEST * each.step, s / 2) for each, s in zip(found, spacings, strict=True))
         return cls(tuple(map(_closed_cells, found, sizes, widths)), widths)
+
+    def ends(self, number: int, pixels: Floats, outward: Floats, reach: int) -> Floats:
+        """Return how far out of the part the texture of a picture ends, (n,) px; NaN where it does not, or not clearly.
+
+        Along each way out, the step from texture to none is taken that most cells agree with.
+
+        Parameters
+        ----------
+        pixels, outward : (n, 2) px, where to look, and the unit direction out of the part
+        reach : cells, how far, either way
+        """
+        cells, width = self.cells[number], self.widths[number]
+        steps = 0.5 * np.arange(-2 * reach, 2 * reach + 1)
+        at = np.floor((pixels[:, None] + width * steps[:, None] * outward[:, None] + 0.5) / width)
+        inside = ((at >= 0) & (at < np.array(cells.shape)[::-1])).all(axis=(1, 2))
+        row, column = (np.clip(at[:, :, k], 0, cells.shape[1 - k] - 1).astype(np.int64) for k in (1, 0))
+        filled = cells[row, column]
+        wrong = np.zeros((len(pixels), len(steps) + 1), np.int64)
+        wrong[:, 1:] = np.cumsum(~filled, axis=1)
+        wrong += np.count_nonzero(filled, axis=1)[:, None]
+        wrong[:, 1:] -= np.cumsum(filled, axis=1)
+        cost = wrong + 1e-3 * np.abs(np.arange(len(steps) + 1) - len(steps) / 2)
+        best = cost.argmin(axis=1)
+        clear = wrong[np.arange(len(best)), best] <= UNCLEAR * len(steps)
+        good = inside & clear & (best > 1) & (best < len(steps) - 1)
+        return np.where(good, width * 0.5 * (best - len(steps) / 2), np.nan)
 
     def bareness(self, views: Sequence[View], places: Places, points_cad: Floats) -> Floats:
         """Return the share of the part that would appear where the pictures show nothing, for each of k places, (k,).
