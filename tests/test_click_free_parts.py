@@ -66,12 +66,17 @@ def test_a_camera_that_shares_with_one_other_only_is_placed_by_what_it_sees_of_t
     surface = Surface(nodes, triangles)
     few = slice(0, 200)
     fit = fitted(Bundle(views[:2], points[few], pixels[few, :2]), np.zeros((200, 3)), surface, free, NOISE, (1e-3,))
-    whole = with_further(fit, (0, 1), [view.camera for view in views], pixels, surface, free, NOISE)
+    cameras = [view.camera for view in views]
+    looks = np.random.default_rng(2).normal(size=(400, 128)).astype(np.float32)
+    looks /= np.linalg.norm(looks, axis=1, keepdims=True)
+    seen = np.isfinite(pixels[:, :, 0])
+    features = [Features(pixels[seen[:, k], k], looks[seen[:, k]], 1.0) for k in range(3)]
+    whole = with_further(fit, (0, 1), cameras, features, surface, free, NOISE)
     for found, true in zip(whole.bundle.views, views, strict=True):
         np.testing.assert_allclose(found.project(points), true.project(points), atol=0.2)
-    pixels[250:, 1] = np.nan
+    features[2] = Features(features[2].pixels, np.roll(features[2].looks, 64, axis=1), 1.0)
     with pytest.raises(MeasurementError, match="Picture 3 has too little in common"):
-        with_further(fit, (0, 1), [view.camera for view in views], pixels, surface, free, NOISE)
+        with_further(fit, (0, 1), cameras, features, surface, free, NOISE)
 
 
 def test_cameras_in_one_place_are_refused():

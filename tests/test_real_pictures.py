@@ -128,14 +128,15 @@ def multidic(data, tmp_path_factory):
     lenses, poses = zip(*((view.camera, view.camera_from_cad) for view in views), strict=True)
     write_calibration_json(folder / "calibration.json", Rig(lenses, camera_from_rig=poses, sigmas=(MULTIDIC,) * 2))
 
-    def measure(frame, radius):
+    def measure(frame, radius, picked=True):
         axis = np.array([0.53, -7.35, 0.0]) + (frame - 1) * np.array([-0.3, -0.35, 0.0])
         matrix = np.eye(4)
         matrix[:3, 3] = -axis
         images = [source / "speckledObjectImages" / str(k) / f"{k}_{frame}.jpg" for k in (201, 202)]
         cad = cylinder(folder / f"{radius}.ply", radius)
-        alignment = f'{{ start = "pose", matrix = {matrix.tolist()} }}'
-        return measured(folder, f"frame{frame}_{radius}", cad, images, folder / "calibration.json", 6.0, alignment)
+        alignment = f'{{ start = "pose", matrix = {matrix.tolist()} }}' if picked else "{}"
+        name = f"frame{frame}_{radius}_{'picked' if picked else 'found'}"
+        return measured(folder, name, cad, images, folder / "calibration.json", 6.0, alignment)
 
     return measure
 
@@ -172,6 +173,17 @@ def test_a_cylinder_may_turn_and_slide(frames):
         words = " ".join(motion.words for motion in frame.part.alignments[0].free)
         assert "shift along (0, 0, 1)" in words
         assert "turn about the axis along (0, 0, 1)" in words
+
+
+def test_the_cylinder_is_found_and_measured_without_a_click(multidic, frames):
+    found = multidic(1, 57.0, picked=False)
+    assert found.part.status is Status.FREE_MOTIONS
+    assert "found from the pictures alone" in " ".join(found.part.remarks)
+    radius, residual = fitted_radius(found.points)
+    assert radius == pytest.approx(57.0, abs=0.1)
+    assert radius == pytest.approx(fitted_radius(frames[0].points)[0], abs=0.02)
+    assert np.sqrt(np.mean(residual**2)) < 0.020
+    assert len(found.points) > 0.9 * found.seen
 
 
 def test_frames_repeat_within_what_is_claimed(frames):

@@ -10,6 +10,7 @@ import numpy as np
 from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
+from inspect3d.outcome import MeasurementError
 from inspect3d.pose import Pose
 from inspect3d.register.similarity import Similarity
 
@@ -17,6 +18,7 @@ FIRM, STIFF = 1e-9, 1e-4  # least damping and that after a refused step, as a sh
 STEADY = 1e-5
 LEAST = 1e-10  # share of the largest eigenvalue below which a motion of the cameras is held: those of all together
 TRIES = 8
+MARGIN = 20.0  # px around a picture, in which its lens must not fold it either
 SETTLING = 8
 
 
@@ -89,6 +91,17 @@ class Bundle:
         """Tell which points lie before all the cameras that see them, (n,)."""
         depths = np.stack([view.depth(self.points) for view in self.views], axis=1)
         return np.asarray(((depths > 0) | ~self.seen).all(axis=1))
+
+    @property
+    def possible(self) -> bool:
+        """Tell whether no lens folds its picture, as one of absurd distortion does."""
+        for view in self.views:
+            across, down = (np.linspace(-MARGIN, side + MARGIN, 5) for side in view.camera.size)
+            try:
+                view.camera.undistorted(np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2))
+            except MeasurementError:
+                return False
+        return True
 
     @property
     def misses(self) -> Floats:

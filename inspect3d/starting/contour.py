@@ -61,8 +61,7 @@ class Contours:
             few = np.random.default_rng(0).permutation(len(points))[: MOST * 2]
             points, of = points[few], of[few]
         edge = chosen[of]
-        ahead = view.depth(points) > 0
-        points, edge = points[ahead], edge[ahead]
+        points, edge = self._pictured(view, points, edge)
         if not len(points):
             return Contour(np.zeros((0, 3)), np.zeros((0, 2)))
         across = self._across(view, points, ends[edge], sides[edge])
@@ -70,6 +69,14 @@ class Contours:
         there, here = (self._meets(view, at + side * BESIDE * step * across) for side in (1.0, -1.0))
         outer = np.flatnonzero(there != here)[:MOST]
         return Contour(points[outer], np.where(there[outer], -1.0, 1.0)[:, None] * across[outer])
+
+    @staticmethod
+    def _pictured(view: View, points: Floats, edge: Integers) -> tuple[Floats, Integers]:
+        """Return the points that lie in the picture, and their edges."""
+        ahead = np.flatnonzero(view.depth(points) > 0)
+        at = view.project(points[ahead])
+        inside = ahead[((at > 0) & (at < np.array(view.camera.size) - 1)).all(axis=1)]
+        return points[inside], edge[inside]
 
     @cached_property
     def _edges(self) -> tuple[Integers, Integers]:

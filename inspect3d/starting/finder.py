@@ -99,7 +99,7 @@ class FindStart:
         said = max(answers, key=lambda each: (bool(each.trials), each.best.count * each.best.agreement.share))
         if shown is not whole:
             progress.update(0.95, "placing further cameras")
-            said = self._completed(said, placed, whole, pixels, noise)
+            said = self._completed(said, placed, whole, noise)
         progress.update(1.0, "searching the part")
         return said
 
@@ -162,13 +162,13 @@ class FindStart:
         agreed = agreement(surface, views, shown.stack, shown.masks)
         return Trial(fit, agreed, shown.outline.unlike(views, surface), shown.outline.met(views), share, count)
 
-    def _completed(self, said: Answer, placed: Sequence[int], whole: Shown, pixels: Floats, noise: float) -> Answer:
+    def _completed(self, said: Answer, placed: Sequence[int], whole: Shown, noise: float) -> Answer:
         """Return the answer with the cameras that had no place yet, as what they see of the CAD tells."""
         surface, freedom = self.nominal.surface, _Free(whole.cameras, whole.lenses, False)
         ends = {}
         for trial in {id(each): each for each in (*said.trials, said.best)}.values():
             lines = whole.outline.lines
-            fit = with_further(trial.fit, placed, whole.cameras, pixels, surface, freedom, noise, lines)
+            fit = with_further(trial.fit, placed, whole.cameras, whole.features, surface, freedom, noise, lines)
             ends[id(trial)] = self._judged(fit, whole)
         return Answer(tuple(ends[id(trial)] for trial in said.trials), said.symmetric, ends[id(said.best)])
 

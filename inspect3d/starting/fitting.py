@@ -76,6 +76,8 @@ def fitted(
         before = bundle
         asked = lines(bundle.views, OUTLINE * share) if lines else None
         bundle = adjusted(bundle, freedom(bundle.views), noise, planes, 4, HELD, asked).bundle
+        if not bundle.possible:
+            return _on(before, turned, surface)
         turn = bundle.views[0].camera_from_cad.rotation.T @ before.views[0].camera_from_cad.rotation
         turned = turned @ turn.T
     return _on(bundle, turned, surface)

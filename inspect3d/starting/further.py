@@ -6,23 +6,23 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from inspect3d.arrays import Floats, Integers, unit
+from inspect3d.arrays import Floats, unit
 from inspect3d.camera import Camera, View
 from inspect3d.correlation.freedom import Freedom
 from inspect3d.nominal.surface import Surface
 from inspect3d.starting.bundle import Bundle, Lines
+from inspect3d.starting.features import Features
 from inspect3d.starting.fitting import FINAL, Fitted, fitted
 from inspect3d.starting.relative import STRAY, too_little
 from inspect3d.starting.resection import resected
-
-MOST = 600  # tracks of a further camera
+from inspect3d.starting.tracks import matches
 
 
 def with_further(
     fit: Fitted,
     placed: Sequence[int],
     cameras: Sequence[Camera],
-    pixels: Floats,
+    features: Sequence[Features],
     surface: Surface,
     freedom: Callable[[tuple[View, ...]], Freedom],
     noise: float,
@@ -30,15 +30,16 @@ def with_further(
 ) -> Fitted:
     """Return cameras and points on the CAD, with the cameras that had no place yet.
 
-    What a placed camera sees lies where its line of sight meets the CAD; a picture that shares tracks with one placed
-    camera only is so placed by perspective-n-point, and all are fitted to the CAD together.
+    What a placed camera sees lies where its line of sight meets the CAD. A picture that shares a few features with one
+    placed camera is so placed by perspective-n-point, most of them wrong perhaps, and all are fitted to the CAD
+    together.
 
     Parameters
     ----------
     fit : the placed cameras and their points
     placed : which of the cameras these are
     cameras : all, with the rough lenses
-    pixels : (n, v, 2) px, tracks of all; NaN where a view does not have one
+    features : of all pictures
     freedom : what may change about all cameras at given places
     noise : px, of a feature's place
     lines : where the outline of the part was found in all pictures, as `fitted` takes it
@@ -50,20 +51,17 @@ def with_further(
     """
     views: dict[int, View] = dict(zip(placed, fit.bundle.views, strict=True))
     found, rows = [fit.bundle.points], [_widened(fit.bundle.pixels, placed, len(cameras))]
-    seen = np.isfinite(pixels[:, :, 0])
     while len(views) < len(cameras):
-        missing = [k for k in range(len(cameras)) if k not in views]
-        shared = {k: np.flatnonzero(seen[:, k] & seen[:, list(views)].any(axis=1)) for k in missing}
-        k = max(missing, key=lambda k: len(shared[k]))
-        tracks = np.random.default_rng(0).permutation(shared[k])[:MOST]
-        points, met = _on_the_cad(pixels[tracks], views, surface)
-        rays = cameras[k].undistorted(pixels[tracks[met], k])
+        offers = {k: _met(k, views, features, surface) for k in range(len(cameras)) if k not in views}
+        k = max(offers, key=lambda k: len(offers[k][0]))
+        points, pixels = offers[k]
+        rays = cameras[k].undistorted(pixels[:, k])
         pose, good = resected(points, rays, 2 * STRAY * noise / float(cameras[k].matrix[0, 0]))
         if pose is None:
             raise too_little(k)
         views[k] = View(cameras[k], pose)
         found.append(points[good])
-        rows.append(pixels[tracks[met[good]]])
+        rows.append(pixels[good])
     bundle = Bundle(tuple(views[k] for k in range(len(cameras))), np.concatenate(found), np.concatenate(rows))
     bundle = bundle.chosen(bundle.ahead)
     return fitted(bundle, surface.closest(bundle.points).normals, surface, freedom, noise, FINAL, lines)
@@ -76,17 +74,20 @@ def _widened(pixels: Floats, placed: Sequence[int], count: int) -> Floats:
     return wide
 
 
-def _on_the_cad(pixels: Floats, views: dict[int, View], surface: Surface) -> tuple[Floats, Integers]:
-    """Return where the first placed camera that sees a track meets the CAD, (m, 3) mm, and the track of each, (m,)."""
-    points, rows = [np.zeros((0, 3))], [np.zeros(0, np.int64)]
-    left = np.ones(len(pixels), bool)
+def _met(number: int, views: dict[int, View], features: Sequence[Features], surface: Surface) -> tuple[Floats, Floats]:
+    """Return where features of placed pictures lie on the CAD that a further one shows as well, perhaps.
+
+    Points (n, 3) mm and pixels (n, v, 2) of the two pictures each, NaN in the others.
+    """
+    points, rows = [np.zeros((0, 3))], [np.zeros((0, len(features), 2))]
     for k, view in views.items():
-        row = np.flatnonzero(np.isfinite(pixels[:, k, 0]) & left)
-        rays = np.column_stack([view.camera.undistorted(pixels[row, k]), np.ones(len(row))])
+        match = matches(features[k], features[number])
+        row = np.full((len(match), len(features), 2), np.nan)
+        row[:, k], row[:, number] = features[k].pixels[match[:, 0]], features[number].pixels[match[:, 1]]
+        rays = np.column_stack([view.camera.undistorted(row[:, k]), np.ones(len(row))])
         sights = unit(view.camera_from_cad.inverse().turned(rays))
         hits = surface.first_hit(view.centre, sights)
         met = hits.triangle >= 0
         points.append(view.centre + hits.distance[met, None] * sights[met])
         rows.append(row[met])
-        left[row[met]] = False
     return np.concatenate(points), np.concatenate(rows)

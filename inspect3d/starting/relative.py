@@ -83,7 +83,8 @@ def relative(cameras: Sequence[Camera], lenses: Sequence[Lens], pixels: Floats, 
     for pose in () if still else pair_poses(pair, rays[both, one], rays[both, other], lens_pair, noise, reach):
         bundle = _all_placed(order, pose, cameras, rays, pixels, noise)
         if bundle is not None:
-            answers.append(_adjusted(bundle, lenses, noise))
+            answer = _adjusted(bundle, lenses, noise)
+            answers += [answer] if answer.possible else []
     if not answers:
         raise MeasurementError(
             "The pictures do not tell where their cameras stand: the lines of sight of what they have in common hardly "

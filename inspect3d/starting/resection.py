@@ -8,7 +8,7 @@ from inspect3d.arrays import Booleans, Floats, floats
 from inspect3d.pose import Pose
 
 ENOUGH = 12  # points that place a camera
-TRIES, CERTAIN = 1000, 0.9999
+TRIES, CERTAIN = 5000, 0.9999
 
 
 def resected(points: Floats, rays: Floats, reach: float) -> tuple[Pose | None, Booleans]:

@@ -31,7 +31,7 @@ def tracks(found: Sequence[Features], rays: Sequence[Floats], focals: Sequence[f
     starts = np.cumsum([0, *(len(each) for each in found)])
     pairs = [np.zeros((0, 2), np.int64)]
     for one, other in combinations(range(len(found)), 2):
-        match = _matches(found[one], found[other])
+        match = matches(found[one], found[other])
         if len(match) >= FEWEST:
             reach = STRAY * max(found[one].step / focals[one], found[other].step / focals[other])
             common = epipolar(rays[one][match[:, 0]], rays[other][match[:, 1]], reach)
@@ -41,7 +41,7 @@ def tracks(found: Sequence[Features], rays: Sequence[Floats], focals: Sequence[f
     return _joined(np.concatenate(pairs), found, starts)
 
 
-def _matches(one: Features, other: Features) -> Integers:
+def matches(one: Features, other: Features) -> Integers:
     """Return pairs (k, 2) of features that are each other's most alike, clearly."""
     if min(len(one), len(other)) < FEWEST:
         return np.zeros((0, 2), np.int64)
