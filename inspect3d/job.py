@@ -16,7 +16,7 @@ from inspect3d.compare.verdict import verdict
 from inspect3d.deviate.deviate import Deviate
 from inspect3d.deviate.deviation import Deviation
 from inspect3d.deviate.nodes import DeviateNodes
-from inspect3d.measure import Cloud, Measure, Measurement, NodalMeasurement
+from inspect3d.measure import Measure, Measurement, NodalMeasurement
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.nominal.nurbs import Nurbs
 from inspect3d.outcome import MeasurementError, Status
@@ -228,8 +228,6 @@ def _at_reference_temperature(measurement: Measurement, budget: Budget) -> Measu
     growth = _growth(budget)
     if growth == 0:
         return measurement
-    clouds = tuple(
-        Cloud(cloud.name, cloud.points / (1 + growth), cloud.normals, cloud.noise) for cloud in measurement.clouds
-    )
+    clouds = tuple(replace(cloud, points=cloud.points / (1 + growth)) for cloud in measurement.clouds)
     words = _growth_words("The points were", growth, budget)
     return replace(measurement, clouds=clouds, remarks=(*measurement.remarks, words))

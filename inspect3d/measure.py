@@ -56,12 +56,14 @@ class Cloud:
     points : (n, 3) mm
     normals : (n, 3), unit, out of the material as far as the instrument knows; zero or None where it does not
     noise : standard uncertainty of a point along the surface normal, mm; None: to be estimated from the cloud
+    shares : (n,), standard uncertainty of each point as a share of the usual one; None: all are alike
     """
 
     name: str
     points: Floats
     normals: Floats | None = None
     noise: float | None = None
+    shares: Floats | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", floats(self.points, "points", None, 3))
@@ -69,6 +71,10 @@ class Cloud:
             object.__setattr__(self, "normals", floats(self.normals, "normals", len(self.points), 3))
         if self.noise is not None and not self.noise > 0:
             raise ValueError(f"the noise of a cloud is positive, not {self.noise}")
+        if self.shares is not None:
+            object.__setattr__(self, "shares", floats(self.shares, "shares", len(self.points)))
+            if not (self.shares > 0).all():
+                raise ValueError("the uncertainty of a point is positive")
 
     def __len__(self) -> int:
         """Return the number of points."""

@@ -209,7 +209,7 @@ class Colmap:
         scaled = [replace(v, camera_from_cad=_scaled(v.camera_from_cad, scale)) for v in views]
         known = known or self.scale_bar is not None
         return Measurement(
-            (Cloud(f"{len(placed)} photographs", points, patched.normals),),
+            (Cloud(f"{len(placed)} photographs", points, patched.normals, shares=sigma / np.median(sigma)),),
             frame="cad" if rig is not None and rig.camera_from_cad else "instrument",
             scale_known=known,
             scale_sigma=scale_sigma,

@@ -1,5 +1,7 @@
 """The deviation map: exact where the truth is known, and as uncertain as it says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -81,6 +83,23 @@ def test_the_local_fit_reproduces_every_quadratic_form_exactly(nominal):
     fit = CloudToNode()(nominal.mesh, feet, np.ones(len(points), bool), 1e-5)
     truth = quadratic(nominal.mesh.nodes[:, 0], nominal.mesh.nodes[:, 1])
     np.testing.assert_allclose(fit.value[fit.observed], truth[fit.observed], atol=2e-3)
+
+
+def test_points_that_are_less_certain_count_less_and_sigma_stays_true(nominal):
+    random = np.random.default_rng(3)
+    points, _ = scanned(random, 20_000)
+    feet, part = nominal.surface.closest(points), np.ones(len(points), bool)
+    shares = np.where(points[:, 0] < WIDTH / 2, 1.0, random.choice([0.5, 1.0, 3.0], len(points)))
+    feet = replace(feet, distance=feet.distance + 0.01 * shares * random.normal(size=len(points)))
+    fit, plain = CloudToNode()(nominal.mesh, feet, part, None, shares), CloudToNode()(nominal.mesh, feet, part)
+    assert fit.noise == pytest.approx(0.01, rel=0.03)
+    mixed = fit.observed & (nominal.mesh.nodes[:, 0] > 0.6 * WIDTH)
+    even = fit.observed & (nominal.mesh.nodes[:, 0] < 0.4 * WIDTH)
+    for nodes in (mixed, even):
+        z = fit.value[nodes] / np.sqrt(fit.variance[nodes])
+        assert np.sqrt(np.mean(z**2)) == pytest.approx(1.0, abs=4 / np.sqrt(2 * nodes.sum()))
+    assert np.median(fit.variance[mixed]) < 0.5 * np.median(plain.variance[mixed])
+    np.testing.assert_allclose(fit.value[even], plain.value[even], atol=1e-12)
 
 
 def test_a_hole_in_the_scan_is_not_observed(nominal):
@@ -171,7 +190,7 @@ distance = 0.1 + 0.02 * feet[:, 0] - 0.03 * feet[:, 1] ** 2 + random.normal(0, 0
 distance[7] = 5.0
 up = np.array([[0.0, 0.0, 1.0]])
 result = fit_nodes(np.zeros((1, 3)), up, np.full((1, 3), 0.9), 0.001, np.array([-1.0, -2.0, -1.0]), 1.0, shape, keys,
-                   feet, np.tile(up, (60, 1)), distance)
+                   feet, np.tile(up, (60, 1)), distance, random.uniform(0.5, 1.0, 60))
 print([f"{float(part[0]):.12g}" for part in result])
 assert abs(result[0][0] - 0.1) < 0.002
 """

@@ -38,9 +38,9 @@ class CloudToNode:
     Points off by more than four robust scales are left out. The radius holds about `wanted` points, within limits set
     by the mesh, and grows where they are few.
 
-    The variance is s² times the first entry of (A'A)⁻¹, with s² pooled from the node's own scatter and the noise of
-    the cloud, which counts as `prior` further points. A node that lies beyond the edge of the scan is not observed: an
-    extrapolated value is not a measured one.
+    Points that are less certain count less. The variance is s² times the first entry of (A'A)⁻¹, with s² pooled from
+    the node's own scatter and the noise of the cloud, which counts as `prior` further points. A node that lies beyond
+    the edge of the scan is not observed: an extrapolated value is not a measured one.
 
     Parameters
     ----------
@@ -57,7 +57,9 @@ class CloudToNode:
     prior: float = 20.0
     unlike: float = 6.0
 
-    def __call__(self, mesh: InspectionMesh, feet: Feet, part: Booleans, noise: float | None = None) -> NodeFit:
+    def __call__(
+        self, mesh: InspectionMesh, feet: Feet, part: Booleans, noise: float | None = None, shares: Floats | None = None
+    ) -> NodeFit:
         """Return the measured surface over the nodes.
 
         Parameters
@@ -66,6 +68,7 @@ class CloudToNode:
         feet : of the points (k,) on the nominal surface
         part : (k,), the points of the part; feet on a rim are left out in any case
         noise : mm, standard uncertainty of a point; None: estimated from the scatter
+        shares : (k,), that of each point as a share of the usual one; None: all are alike
         """
         from inspect3d.deviate.local_fit_kernel import fit_nodes
 
@@ -81,7 +84,8 @@ class CloudToNode:
         keys = (cells[:, 0] * shape[1] + cells[:, 1]) * shape[2] + cells[:, 2]
         order = np.argsort(keys, kind="stable")
         chosen, keys = chosen[order], keys[order]
-        grid = (low, cell, shape, keys, feet.points[chosen], feet.normals[chosen], feet.distance[chosen])
+        weights = np.ones(len(chosen)) if shares is None else 1 / shares[chosen]
+        grid = (low, cell, shape, keys, feet.points[chosen], feet.normals[chosen], feet.distance[chosen], weights)
         radii = self._radii(mesh, keys, cell)
         value, factor, squares, freedom = fit_nodes(mesh.nodes, mesh.normals, radii, noise or 0.0, *grid)
         observed = np.isfinite(factor) & ~mesh.crease

@@ -104,10 +104,11 @@ class Deviate:
         points = np.concatenate([place(cloud.points) for cloud, place in zip(clouds, alignments, strict=True)])
         normals = _normals(clouds, alignments)
         noise = _common_noise(clouds, alignments)
+        shares = _shares(clouds)
         moved = Similarity.identity()
         for _ in range(self.steps):
             feet = nominal.surface.closest(moved(points))
-            fit = self._observe(nominal, feet, moved.turned(normals), noise, counted)
+            fit = self._observe(nominal, feet, moved.turned(normals), noise, shares, counted)
             seen = np.flatnonzero(fit.observed)
             value = fit.value[seen] - self.coating
             gauge = self.fit(mesh, seen, value, not self.scale_known)
@@ -138,7 +139,13 @@ class Deviate:
         )
 
     def _observe(
-        self, nominal: Nominal, feet: Feet, normals: Floats, noise: float | None, counted: Booleans
+        self,
+        nominal: Nominal,
+        feet: Feet,
+        normals: Floats,
+        noise: float | None,
+        shares: Floats | None,
+        counted: Booleans,
     ) -> NodeFit:
         reach = self.reach or FOREIGN * nominal.diagonal
         cosine = np.einsum("ni,ni->n", normals, feet.normals)
@@ -146,7 +153,7 @@ class Deviate:
         told = np.linalg.norm(normals, axis=1) > 0.5
         turned_in = np.count_nonzero(cosine[near & told] < 0) > 0.7 * np.count_nonzero(near & told)
         part = near if turned_in else near & (~told | (cosine > 0))
-        fit = self.to_node(nominal.mesh, feet, part, noise)
+        fit = self.to_node(nominal.mesh, feet, part, noise, shares)
         observed = fit.observed & counted
         if np.count_nonzero(observed) < LEAST_NODES:
             raise MeasurementError(
@@ -227,6 +234,13 @@ def _normals(clouds: tuple[Cloud, ...], alignments: tuple[Alignment, ...]) -> Fl
             for cloud, place in zip(clouds, alignments, strict=True)
         ]
     )
+
+
+def _shares(clouds: tuple[Cloud, ...]) -> Floats | None:
+    """Return the uncertainty of each point of all clouds as a share of the usual one; None where none tells it."""
+    if all(cloud.shares is None for cloud in clouds):
+        return None
+    return np.concatenate([np.ones(len(cloud)) if cloud.shares is None else cloud.shares for cloud in clouds])
 
 
 def _common_noise(clouds: tuple[Cloud, ...], alignments: tuple[Alignment, ...]) -> float | None:

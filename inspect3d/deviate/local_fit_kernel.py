@@ -113,12 +113,15 @@ def _solve(columns: Floats, y: Floats, kept: Booleans, unknowns: int, matrix: Fl
 
 
 @njit(cache=True)
-def _fit(columns: Floats, y: Floats, noise: float, unknowns: int) -> tuple[float, float, float, int]:
-    """Return value at the node, variance factor, sum of squared residuals, points kept; factor inf: no fit."""
+def _fit(columns: Floats, y: Floats, plain: Floats, noise: float, unknowns: int) -> tuple[float, float, float, int]:
+    """Return value at the node, variance factor, sum of squared residuals, points kept; factor inf: no fit.
+
+    Rows and right-hand side are weighted; `plain` is the latter without.
+    """
     n = len(y)
-    middle = np.median(y)
-    scale = max(1.4826 * np.median(np.abs(y - middle)), noise)
-    kept = np.abs(y - middle) <= REJECTED * scale
+    middle = np.median(plain)
+    scale = max(1.4826 * np.median(np.abs(plain - middle)), noise)
+    kept = np.abs(plain - middle) <= REJECTED * scale
     matrix, coefficients = np.empty((unknowns, unknowns)), np.zeros(unknowns)
     residual = np.empty(n)
     factor, squares, count = math.inf, 0.0, 0
@@ -160,6 +163,7 @@ def fit_nodes(
     feet: Floats,
     foot_normals: Floats,
     distance: Floats,
+    weights: Floats,
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Return value (mm), variance factor, residual sum of squares (mm²) and degrees of freedom for each node.
 
@@ -170,6 +174,7 @@ def fit_nodes(
     noise : mm, floor of the rejection scale
     low, cell, shape, keys : grid of the feet; keys (m,) sorted
     feet, foot_normals, distance : of the points, (m, 3), (m, 3), (m,), in the order of the keys
+    weights : (m,), usual uncertainty of a point over that of each
 
     Returns
     -------
@@ -193,22 +198,25 @@ def fit_nodes(
                 break
         if count < LEAST:
             continue
-        columns, y = np.empty((count, 6)), np.empty(count)
+        columns, y, plain = np.empty((count, 6)), np.empty(count), np.empty(count)
+        certain, east, north = 0.0, 0.0, 0.0
         for c in range(count):
             p = found[c]
             u = v = 0.0
             for a in range(3):
                 u += (feet[p, a] - nodes[i, a]) * first[a] / radius
                 v += (feet[p, a] - nodes[i, a]) * second[a] / radius
-            columns[c, 0], columns[c, 1], columns[c, 2] = 1.0, u, v
-            columns[c, 3], columns[c, 4], columns[c, 5] = u * u, u * v, v * v
-            y[c] = distance[p]
-        if math.hypot(np.mean(columns[:, 1]), np.mean(columns[:, 2])) > AMIDST:
+            w = weights[p]
+            columns[c, 0], columns[c, 1], columns[c, 2] = w, w * u, w * v
+            columns[c, 3], columns[c, 4], columns[c, 5] = w * u * u, w * u * v, w * v * v
+            y[c], plain[c] = w * distance[p], distance[p]
+            certain, east, north = certain + w * w / count, east + u / count, north + v / count
+        if math.hypot(east, north) > AMIDST:
             continue
         if count >= ENOUGH:
-            value[i], factor[i], squares[i], freedom[i] = _fit(columns, y, noise, QUADRATIC)
-        if not factor[i] <= 1.0:
-            value[i], factor[i], squares[i], freedom[i] = _fit(columns, y, noise, LINEAR)
-        if not factor[i] <= 1.0:
+            value[i], factor[i], squares[i], freedom[i] = _fit(columns, y, plain, noise, QUADRATIC)
+        if not factor[i] * certain <= 1.0:
+            value[i], factor[i], squares[i], freedom[i] = _fit(columns, y, plain, noise, LINEAR)
+        if not factor[i] * certain <= 1.0:
             factor[i] = math.inf
     return value, factor, squares, freedom
