@@ -27,6 +27,7 @@ from inspect3d.correlation.picture import Pictures
 from inspect3d.correlation.residual import residuals
 from inspect3d.correlation.shape import Shape
 from inspect3d.correlation.splines import Splines
+from inspect3d.nominal.nurbs import Nurbs
 from inspect3d.nominal.nurbs_face import nurbs_of
 from inspect3d.nominal.step_iges import read_brep
 from inspect3d.outcome import InputError
@@ -97,17 +98,17 @@ def _step(chosen: argparse.Namespace) -> None:
     print(f"height found of a step of {1e3 * HEIGHT:g} µm, nodes {BANDS[0]:g} to {BANDS[1]:g} mm away; mean over seeds")
     for words, (setup, at) in places.items():
         for trial in setup.trials(CASES["known"], range(chosen.seeds)):
-            for name in ("nodes", "CAD's knots", "halved once", "halved twice"):
+            for name in ("nodes", "CAD's knots, apart", "CAD's knots", "halved once", "halved twice"):
                 try:
                     shape, _ = _measured(METHODS[name], trial)
                 except Exception as error:
-                    print(f"{words:26s} {name:14s} {error}")
+                    print(f"{words:26s} {name:18s} {error}")
                     continue
                 height, sigma = _height(shape, at)
                 truth = trial.dataset.deviation(shape.scene.nodes)
                 true, _ = _height(shape, at, truth)
                 print(
-                    f"{words:26s} {name:14s} found {1e3 * height:6.1f} true {1e3 * true:6.1f} sigma {1e3 * sigma:5.2f} "
+                    f"{words:26s} {name:18s} found {1e3 * height:6.1f} true {1e3 * true:6.1f} sigma {1e3 * sigma:5.2f} "
                     f"unknowns {len(shape.state.motion)}",
                     flush=True,
                 )
@@ -133,9 +134,12 @@ def _sigma(chosen: argparse.Namespace) -> None:
     for words, (part, deviation) in (inside | outside).items():
         setup = Setup(part, full=chosen.full, element=chosen.element, deviation=deviation)
         for case in chosen.cases:
-            for name in ("CAD's knots", "halved once")[: 1 if "in their" in words else 2]:
-                found = [_told(METHODS[name], t) for t in setup.trials(CASES[case], range(chosen.seeds))]
-                error, sigma, rough, kappa = zip(*found, strict=True)
+            found: dict[str, list] = {}
+            for trial in setup.trials(CASES[case], range(chosen.seeds)):
+                for name in ("CAD's knots", "halved once")[: 1 if "in their" in words else 2]:
+                    found.setdefault(name, []).append(_told(METHODS[name], trial))
+            for name, rows in found.items():
+                error, sigma, rough, kappa = zip(*rows, strict=True)
                 z = np.concatenate(error) / np.concatenate(sigma)
                 print(
                     f"{words:28s} {name:12s} {1e3 * rms(np.concatenate(error)):7.2f} "
@@ -181,19 +185,34 @@ def _stages(shape: Shape, trial: Trial) -> tuple[float, float]:
 def _faces(folder: Path) -> None:
     random = np.random.default_rng(0)
     for path in _models(folder):
-        part, worst, failed = read_brep(path), 0.0, 0
+        part, worst, beyond, failed = read_brep(path), 0.0, 0.0, 0
+        converted = {}
         for number, surface in enumerate(part.surfaces, start=1):
             try:
-                nurbs = nurbs_of(part, number)
+                nurbs = converted[number] = nurbs_of(part, number)
             except InputError:
                 failed += 1
                 continue
             low = [surface.FirstUParameter(), surface.FirstVParameter()]
             high = [surface.LastUParameter(), surface.LastVParameter()]
             points = part.points_at(np.full(12, number), random.uniform(low, high, (12, 2)))
-            away = np.linalg.norm(nurbs.points(nurbs.parameters(points)) - points, axis=1)
-            worst = max(worst, float(away.max()))
-        print(f"{path.name:40s} {len(part.faces):5d} faces, {failed} do not convert, worst {worst:.1e} mm", flush=True)
+            worst = max(worst, _away(nurbs, points))
+        for curve, numbers, tolerance in zip(part.curves, part.edge_faces, part.edge_tolerance, strict=True):
+            if curve is not None:
+                at = np.linspace(curve.FirstParameter(), curve.LastParameter(), 7)
+                points = np.array([curve.Value(t).Coord() for t in at.tolist()])
+                shares = [_away(converted[n], points) / tolerance for n in numbers if n in converted]
+                beyond = max(beyond, *shares, 0.0)
+        print(
+            f"{path.name:40s} {len(part.faces):5d} faces, {failed} do not convert, worst {worst:.1e} mm; "
+            f"{len(part.edges)} edges, worst {beyond:.3f} of their tolerance",
+            flush=True,
+        )
+
+
+def _away(nurbs: Nurbs, points: Floats) -> float:
+    """Return how far points (n, 3) lie off a surface at most, mm."""
+    return float(np.linalg.norm(nurbs.points(nurbs.parameters(points)) - points, axis=1).max())
 
 
 def _models(folder: Path) -> Iterator[Path]:

@@ -29,6 +29,8 @@ class Isogeometric:
     faces : numbers of the faces to measure, as in the file; none: those that the cameras see
     refine : how often every span between two knots is halved
     degree : to which the surfaces are raised at least; 0: as in the CAD
+    directions : in which control points move: "normal"; or "all", of which only those count that move the surface
+        otherwise than normal motions do
     continuity : degrees between neighbouring faces, below which they keep together along their edge, and smoothly where
         the CAD is smooth; 0: each face moves by itself
     interpolation : of the pictures: "cubic" B-spline; "linear" as in the paper
@@ -44,6 +46,7 @@ class Isogeometric:
     faces: tuple[int, ...] = ()
     refine: int = 0
     degree: int = 0
+    directions: Literal["normal", "all"] = "normal"
     continuity: float = 45.0
     interpolation: Literal["cubic", "linear"] = "cubic"
     steepest: float = 65.0
@@ -80,7 +83,8 @@ class Isogeometric:
             The landmarks do not fit, the pictures do not show the part twice, or they do not agree; or the model has no
             faces whose control points the pictures can tell apart on this mesh.
         """
-        splines = Splines(self.faces, self.refine, self.degree, self.continuity)
+        ways = 3 if self.directions == "all" else 1
+        splines = Splines(self.faces, self.refine, self.degree, ways, self.continuity)
         correlate = replace(self._stereo.correlate(nominal), splines=splines)
         return self._stereo(source, nominal, correlate)
 

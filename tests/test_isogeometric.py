@@ -55,7 +55,7 @@ def normals(x, y):
 
 def within(x, y):
     """Return a deviation in the space of the splines, mm: control points moved along their normals."""
-    moved = NURBS.functions(at(x, y)) @ (MOTIONS[:, None] * NURBS.directions)
+    moved = NURBS.functions(at(x, y)) @ (MOTIONS[:, None] * NURBS.frames[:, 0])
     return (moved * normals(x, y)).sum(axis=1)
 
 

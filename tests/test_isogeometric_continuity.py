@@ -11,6 +11,7 @@ from inspect3d.correlation.attachment import Attachment
 from inspect3d.correlation.continuity import joints, kept_together
 from inspect3d.correlation.evaluation import evaluation_points
 from inspect3d.correlation.scene import Scene
+from inspect3d.correlation.splines import telling
 from inspect3d.nominal.borders import borders
 from inspect3d.nominal.load import load_nominal
 from inspect3d.nominal.nurbs_face import nurbs_of
@@ -123,3 +124,15 @@ def test_a_seam_of_a_smooth_face_stays_smooth(tube):
     np.testing.assert_allclose(here, there, atol=0.01)
     np.testing.assert_allclose(inner - here, there - beyond, atol=5e-4 * step)
     assert np.abs(inner - here).max() > 5e-3 * step
+
+
+def test_in_all_directions_a_curved_face_follows_more_than_along_its_normals(block):
+    scene, face = whole_scene(block, (SECTION,))
+    nodes = Attachment(block, scene, {SECTION: nurbs_of(block.exact, SECTION)}, face, ways=3).space.nodes
+    inside = ~block.mesh.crease[scene.node]
+    aside = scene.normals[inside, 0]
+    left = []
+    for free in (np.eye(nodes.shape[1])[:, ::3], telling(nodes, 3)):
+        moved = nodes[inside] @ free
+        left.append(np.std(aside - moved @ np.linalg.lstsq(moved, aside, rcond=None)[0]))
+    assert left[1] < 0.1 * left[0]

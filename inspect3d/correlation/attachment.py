@@ -28,18 +28,20 @@ class Attachment:
     ----------
     patches : by the number of their face
     face : (f,), of the middle of each facet of the scene
+    ways : in which each control point moves, see `Nurbs.along`
     """
 
     nominal: Nominal
     scene: Scene
     patches: dict[int, Nurbs]
     face: Integers
+    ways: int = 1
 
     @property
     def space(self) -> SplineSpace:
         """Return the motions of the nodes that the control points allow; zero for nodes that they do not move."""
         scene, shapes = self.scene, sample_points()
-        total = sum(patch.size for patch in self.patches.values())
+        total = self.ways * sum(patch.size for patch in self.patches.values())
         normals = unit(np.einsum("si,fid->fsd", shapes, scene.normals[scene.triangles]))
         of_nodes, of_samples = [], []
         node_order, sample_order = [], []
@@ -51,14 +53,14 @@ class Attachment:
             corners = uv[np.searchsorted(nodes, scene.triangles[facets])]
             guess = (shapes[there, :, None] * corners).sum(axis=1)
             near = _near(patch, self._samples[facets, there], guess)
-            of_samples.append(_rows(patch, near, normals[facets, there], first, total))
+            of_samples.append(_rows(patch, near, normals[facets, there], first, total, self.ways))
             sample_order.append(facets * len(shapes) + there)
             own = self._node_face[nodes] == number
-            of_nodes.append(_rows(patch, uv[own], scene.normals[nodes[own]], first, total))
+            of_nodes.append(_rows(patch, uv[own], scene.normals[nodes[own]], first, total, self.ways))
             node_order.append(nodes[own])
-            first += patch.size
+            first += self.ways * patch.size
         return SplineSpace(
-            _sorted(of_nodes, node_order), _sorted(of_samples, sample_order), tuple(self.patches.values())
+            _sorted(of_nodes, node_order), _sorted(of_samples, sample_order), tuple(self.patches.values()), self.ways
         )
 
     @cached_property
@@ -112,7 +114,7 @@ def _near(patch: Nurbs, points: Floats, guess: Floats) -> Floats:
     return uv
 
 
-def _rows(patch: Nurbs, uv: Floats, towards: Floats, first: int, total: int) -> sparse.csr_matrix:
+def _rows(patch: Nurbs, uv: Floats, towards: Floats, first: int, total: int, ways: int) -> sparse.csr_matrix:
     """Return how far places (p,) move along directions to follow each control point's motion, (p, total).
 
     The surface moves by v . n along its normal n where the control points move it by v; along a direction m that leans,
@@ -126,5 +128,5 @@ def _rows(patch: Nurbs, uv: Floats, towards: Floats, first: int, total: int) -> 
     normals = patch.normals(uv)
     upright = (normals * towards).sum(axis=1)
     shares = np.divide(1.0, upright, out=np.zeros(len(uv)), where=upright > UPRIGHT)
-    rows = patch.along(uv, normals * shares[:, None])
+    rows = patch.along(uv, normals * shares[:, None], ways)
     return sparse.csr_matrix((rows.data, rows.indices + first, rows.indptr), shape=(len(uv), total))

@@ -46,7 +46,7 @@ class Side:
 
 
 def joints(
-    brep: Brep, patches: Mapping[int, Nurbs], scene: Scene, face: Integers, sharpest: float
+    brep: Brep, patches: Mapping[int, Nurbs], scene: Scene, face: Integers, sharpest: float, ways: int = 1
 ) -> tuple[Floats, Floats]:
     """Return rows (m, k), which vanish for motions of the control points that keep the faces together.
 
@@ -60,15 +60,18 @@ def joints(
     ----------
     patches : by the number of their face; their control points are numbered one patch after the other
     face : (f,), of each facet of the scene
+    ways : in which each control point moves, see `Nurbs.along`
     """
     edge = float(np.median(np.linalg.norm(np.diff(scene.nodes[scene.triangles[:, :2]], axis=1), axis=2)))
     trees = {n: cKDTree(scene.nodes[np.unique(scene.triangles[face == n])]) for n in patches}
-    sizes = np.cumsum([0, *(patch.size for patch in patches.values())])
+    sizes = np.cumsum([0, *(ways * patch.size for patch in patches.values())])
     first = dict(zip(patches, sizes.tolist(), strict=False))
     found = [np.zeros((0, sizes[-1] + WHOLE))]
     for border in borders(brep, patches, SPACING * edge):
         seen = np.all([trees[n].query(border.points)[0] < REACH * edge for n in border.faces], axis=0)
-        one, other = (_side(patches[n], border, k, HAIR * SPACING * edge, scene) for k, n in enumerate(border.faces))
+        one, other = (
+            _side(patches[n], border, k, HAIR * SPACING * edge, scene, ways) for k, n in enumerate(border.faces)
+        )
         angle = np.degrees(np.arccos(np.clip((one.normals * other.normals).sum(axis=1), -1, 1)))
         together = seen & (angle < sharpest)
         smooth = together & (angle < SMOOTH) & (one.supple | other.supple)
@@ -77,7 +80,7 @@ def joints(
                 rows = _agreeing(left, right)
                 wide = np.zeros((len(rows[0]), sizes[-1] + WHOLE))
                 for n, block in zip(border.faces, rows[:2], strict=True):
-                    wide[:, first[n] : first[n] + patches[n].size] += block
+                    wide[:, first[n] : first[n] + ways * patches[n].size] += block
                 wide[:, -WHOLE:] = rows[2]
                 found.append(wide)
     together = np.concatenate(found)
@@ -107,14 +110,14 @@ def _whole(points: Floats, normals: Floats, scene: Scene) -> Floats:
     return jacobian(points, normals, scene.centre) / np.array([length] * 3 + [1.0] * 3)
 
 
-def _side(patch: Nurbs, border: Border, k: int, hair: float, scene: Scene) -> Side:
+def _side(patch: Nurbs, border: Border, k: int, hair: float, scene: Scene, ways: int) -> Side:
     """Return the first or second face along a border, with slopes over `hair` mm."""
     inward = unit(np.cross(patch.normals(patch.parameters(border.points)), border.along[k]))
     inner = patch.parameters(border.points + hair * inward)
     at = patch.descended(border.points, inner)  # at a seam, on this side of it
     places, normals = zip(*((patch.points(uv), patch.normals(uv)) for uv in (at, inner)), strict=True)
     here, there = (
-        np.column_stack([patch.along(uv, n).toarray(), _whole(x, n, scene)])
+        np.column_stack([patch.along(uv, n, ways).toarray(), _whole(x, n, scene)])
         for uv, x, n in zip((at, inner), places, normals, strict=True)
     )
     ways = np.linalg.norm(places[1] - places[0], axis=1, keepdims=True)

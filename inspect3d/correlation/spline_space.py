@@ -26,7 +26,7 @@ SAMPLES = 4
 
 @dataclass(frozen=True, eq=False)
 class SplineSpace:
-    """Motions of the control points along their normals, p = Z q mm, by the unknowns q (k,).
+    """Motions of the control points along their normals, or in all directions, p = Z q mm, by the unknowns q (k,).
 
     Each facet follows the spline by a cubic, fitted to it at the sample points; for the derivatives by q, by the plane
     that fits best there. The solution is that of the cubic: a residual that vanishes does so whatever it is multiplied
@@ -37,12 +37,14 @@ class SplineSpace:
     nodes : (n, c), how the control points move the nodes
     samples : (16 f, c), the same at the sample points of every facet
     patches : the nominal surfaces, their control points numbered one patch after the other
+    ways : in which each control point moves, see `Nurbs.along`
     free : Z (c, k), orthonormal columns; none: q = p
     """
 
     nodes: sparse.csr_matrix
     samples: sparse.csr_matrix
     patches: tuple[Nurbs, ...]
+    ways: int = 1
     free: Floats | None = None
 
     @property
@@ -51,8 +53,8 @@ class SplineSpace:
         return True
 
     def within(self, free: Floats) -> SplineSpace:
-        """Return the space of some motions (c, k) of the control points only, orthonormal columns."""
-        return replace(self, free=free)
+        """Return the space of some of its motions only, orthonormal columns (k, m)."""
+        return replace(self, free=self._spread(free))
 
     def rows(self, scene: Scene) -> sparse.csr_matrix:
         """Return B (n, k)."""
@@ -116,9 +118,11 @@ class SplineSpace:
 
     def surfaces(self, motion: Floats) -> tuple[Nurbs, ...]:
         """Return the patches whose control points have moved; those that nobody sees have not."""
-        parts = np.split(self._spread(motion), np.cumsum([patch.size for patch in self.patches])[:-1])
+        ends = np.cumsum([patch.size for patch in self.patches])[:-1]
+        parts = np.split(self._spread(motion).reshape(-1, self.ways), ends)
         return tuple(
-            patch.moved(part[:, None] * patch.directions) for patch, part in zip(self.patches, parts, strict=True)
+            patch.moved(np.einsum("ij,ijd->id", part, patch.frames[:, : self.ways]))
+            for patch, part in zip(self.patches, parts, strict=True)
         )
 
     def restricted(self, node: Integers, kept: Booleans) -> SplineSpace:

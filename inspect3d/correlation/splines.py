@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import sparse
 
-from inspect3d.arrays import Integers
+from inspect3d.arrays import Floats, Integers
 from inspect3d.correlation.attachment import Attachment
 from inspect3d.correlation.continuity import joints, kept_together
 from inspect3d.correlation.scene import Scene
@@ -17,6 +18,7 @@ from inspect3d.nominal.nurbs import Nurbs
 from inspect3d.nominal.nurbs_face import nurbs_of
 from inspect3d.outcome import InputError, MeasurementError
 
+RIDGE, TELLING = 1e-9, 0.01
 ENOUGH = 1.5  # nodes for each control point, at the least
 
 
@@ -29,12 +31,15 @@ class Splines:
     faces : their numbers; none: those that the cameras see
     refine : how often every span between two knots is halved
     degree : to which the surfaces are raised at least; 0: as in the CAD
+    ways : in which each control point moves: 1, along its normal; 3, in all directions, of which only those count that
+        move the surface otherwise than normal motions do
     continuity : degrees between neighbouring faces, below which they keep together; see `joints`; 0: they never do
     """
 
     faces: tuple[int, ...] = ()
     refine: int = 0
     degree: int = 0
+    ways: int = 1
     continuity: float = 45.0
 
     def __call__(self, nominal: Nominal, seen: Scene) -> Scene:
@@ -58,8 +63,8 @@ class Splines:
         kept = np.isin(face, list(patches)) & seen.whole[seen.triangles].all(axis=1)
         rest, _ = seen.restricted(kept)
         face = face[kept]
-        rest = replace(rest, space=Attachment(nominal, rest, patches, face).space)
-        moved = np.asarray(rest.space.rows(rest).sum(axis=1)).ravel() > 0
+        rest = replace(rest, space=Attachment(nominal, rest, patches, face, self.ways).space)
+        moved = np.asarray(abs(rest.space.rows(rest)).sum(axis=1)).ravel() > 0
         if not moved.all():  # corners round a sharp edge, which the face does not move
             kept = np.asarray(moved[rest.triangles].all(axis=1))
             rest, face = rest.restricted(kept)[0], face[kept]
@@ -69,10 +74,13 @@ class Splines:
         """Return a scene in which neighbouring faces keep together; `face` (f,) is that of each facet."""
         space = apart.space
         assert isinstance(space, SplineSpace)
-        rows, shifts = joints(brep, patches, apart, face, self.continuity)
-        if not len(rows):
-            return apart
-        return replace(apart, space=space.within(kept_together(rows, shifts, space.nodes, apart)))
+        rows, shifts = joints(brep, patches, apart, face, self.continuity, self.ways)
+        if self.ways > 1:
+            free = telling(space.nodes, self.ways)
+            space, rows = space.within(free), rows @ free
+        if len(rows):
+            space = space.within(kept_together(rows, shifts, space.rows(apart), apart))
+        return replace(apart, space=space)
 
     def _patches(self, brep: Brep, seen: Scene, face: Integers) -> dict[int, Nurbs]:
         """Return the chosen faces by number, those of a choice by itself only where the mesh is fine enough."""
@@ -111,3 +119,27 @@ def _too_coarse(number: int, functions: int, nodes: int) -> str:
         f"The mesh is too coarse for face {number}: {functions} of its control points move the {nodes} nodes that two "
         "cameras see. Set element_size or `refine` lower."
     )
+
+
+def telling(nodes: sparse.csr_matrix, ways: int) -> Floats:
+    """Return motions (c, k) of the control points, orthonormal: all normal ones, and tangential ones that tell.
+
+    Tangential motions mostly slide the surface in itself. Of what normal motions do not do as well, those count that
+    move the nodes by a hundredth of what a normal motion does, or more.
+
+    Parameters
+    ----------
+    nodes : (n, c), how control points move the nodes, `ways` columns for each, its normal first
+    """
+    along = np.arange(nodes.shape[1]) % ways == 0
+    normal, sliding = nodes[:, along], nodes[:, ~along]
+    square = (normal.T @ normal).toarray()
+    typical = float(np.median(np.diag(square)))
+    across = (normal.T @ sliding).toarray()
+    square += RIDGE * typical * np.eye(len(square))
+    values, modes = np.linalg.eigh((sliding.T @ sliding).toarray() - across.T @ np.linalg.solve(square, across))
+    kept = values > TELLING**2 * typical
+    free = np.zeros((nodes.shape[1], len(square) + np.count_nonzero(kept)))
+    free[along, : len(square)] = np.eye(len(square))
+    free[~along, len(square) :] = modes[:, kept]
+    return free

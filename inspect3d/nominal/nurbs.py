@@ -70,13 +70,20 @@ class Nurbs:
         """Return R (n, a b), what each control point weighs at parameters (n, 2); rows add up to one."""
         return self._spread(*self._weighed(uv))
 
-    def along(self, uv: Floats, towards: Floats) -> sparse.csr_matrix:
-        """Return how far a motion of each control point along its normal moves places along directions (n, 3)."""
+    def along(self, uv: Floats, towards: Floats, ways: int = 1) -> sparse.csr_matrix:
+        """Return how far motions of the control points move places along directions (n, 3), (n, ways a b).
+
+        Parameters
+        ----------
+        ways : in which each moves, see `frames`: 1, its normal; or 3. They are numbered one control point after another
+        """
         from inspect3d.nominal.nurbs_kernel import turn_towards
 
         columns, values = self._weighed(uv)
-        turn_towards(columns, self.directions, np.ascontiguousarray(towards), values)
-        return self._spread(columns, values)
+        turned = np.empty((*values.shape, ways))
+        turn_towards(columns, self.frames[:, :ways], np.ascontiguousarray(towards), values, turned)
+        each, wide = ways * columns[:, :, None] + np.arange(ways), (len(uv), ways * columns.shape[1])
+        return self._spread(each.reshape(wide), turned.reshape(wide), ways)
 
     def points(self, uv: Floats) -> Floats:
         """Return S (n, 3) mm."""
@@ -152,9 +159,11 @@ class Nurbs:
         return np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
 
     @cached_property
-    def directions(self) -> Floats:
-        """Return the normals (a b, 3) of the surface where its control points belong."""
-        return self.normals(self.greville)
+    def frames(self) -> Floats:
+        """Return the normals of the surface where its control points belong, and two tangents, (a b, 3, 3), unit."""
+        normals = self.normals(self.greville)
+        first = unit(np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)]))
+        return np.stack([normals, first, np.cross(normals, first)], axis=1)
 
     def moved(self, motions: Floats) -> Nurbs:
         """Return the surface after motions (a b, 3) mm of its control points."""
@@ -174,9 +183,9 @@ class Nurbs:
         write_functions(self._net, p, q, self._within(uv), columns, values)
         return columns, values
 
-    def _spread(self, columns: Integers, values: Floats) -> sparse.csr_matrix:
+    def _spread(self, columns: Integers, values: Floats, ways: int = 1) -> sparse.csr_matrix:
         starts = np.arange(len(values) + 1) * values.shape[1]
-        return sparse.csr_matrix((values.ravel(), columns.ravel(), starts), shape=(len(values), self.size))
+        return sparse.csr_matrix((values.ravel(), columns.ravel(), starts), shape=(len(values), ways * self.size))
 
     @property
     def _net(self) -> tuple[Floats, Floats, Floats, Floats]:

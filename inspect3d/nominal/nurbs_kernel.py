@@ -117,13 +117,16 @@ def write_functions(net: Net, p: int, q: int, uv: Floats, columns: Integers, val
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def turn_towards(columns: Integers, directions: Floats, normals: Floats, values: Floats) -> None:
-    """Multiply values (n, w) by the shares along normals (n, 3) of the directions (k, 3) that columns (n, w) name."""
+def turn_towards(columns: Integers, frames: Floats, normals: Floats, values: Floats, turned: Floats) -> None:
+    """Write values (n, w) times the shares of directions (k, d, 3), by columns, along normals (n, 3): (n, w, d)."""
+    ways = frames.shape[1]
     for chunk in prange(CHUNKS):
         for n in range(chunk * len(values) // CHUNKS, (chunk + 1) * len(values) // CHUNKS):
+            x, y, z = normals[n]
             for m in range(values.shape[1]):
-                of = directions[columns[n, m]]
-                values[n, m] *= of[0] * normals[n, 0] + of[1] * normals[n, 1] + of[2] * normals[n, 2]
+                for d in range(ways):
+                    way = frames[columns[n, m], d]
+                    turned[n, m, d] = values[n, m] * (way[0] * x + way[1] * y + way[2] * z)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
