@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from inspect3d.correlation.splines import Splines
+from inspect3d.correlation.splines import Splines, exact_faces
 from inspect3d.correlation.stereo import PickedPoint, Stereo, StereoSource
 from inspect3d.measure import Files, NodalMeasurement
 from inspect3d.nominal.nominal import Nominal
@@ -83,6 +83,7 @@ class Isogeometric:
             The landmarks do not fit, the pictures do not show the part twice, or they do not agree; or the model has no
             faces whose control points the pictures can tell apart on this mesh.
         """
+        exact_faces(nominal)
         ways = 3 if self.directions == "all" else 1
         splines = Splines(self.faces, self.refine, self.degree, ways, self.continuity)
         correlate = replace(self._stereo.correlate(nominal), splines=splines)

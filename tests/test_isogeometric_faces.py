@@ -7,9 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from inspect3d.nominal.load import load_nominal
 from inspect3d.nominal.nurbs import Nurbs
 from inspect3d.nominal.nurbs_face import nurbs_of
 from inspect3d.nominal.step_iges import read_brep
+from inspect3d.outcome import MeasurementError
+from inspect3d.registry import build
 from inspect3d.virtual.bracket import bracket
 from inspect3d.virtual.freeform import FreeformSizes, freeform, freeform_patch
 
@@ -87,3 +90,29 @@ def test_faces_of_real_files_evaluate_to_the_points_of_their_b_rep(name):
     part, random = read_brep(DATA / name), np.random.default_rng(0)
     numbers = np.unique(np.linspace(1, len(part.faces), min(FEW, len(part.faces))).astype(int)).tolist()
     assert max(worst_gap(part, number, random) for number in numbers) < 1e-6
+
+
+def soup(count=40):
+    """Return tetrahedra that hang together nowhere, 3 (4 n) corners (12 n, 3) mm."""
+    random = np.random.default_rng(0)
+    corners = random.uniform(0, 60, (count, 1, 3)) + random.uniform(-4, 4, (count, 4, 3))
+    return corners[:, [0, 1, 2, 0, 3, 1, 1, 3, 2, 2, 3, 0]].reshape(-1, 3)
+
+
+def holed(side=13, pitch=4.0):
+    """Return the facets of a flat sheet with a hole in it, as corners (3 m, 3) mm."""
+    i, j = np.stack(np.meshgrid(range(side), range(side), indexing="ij"), axis=-1).reshape(-1, 2).T
+    kept = np.hypot(i - side / 2, j - side / 2) > 2.5
+    low = np.stack([i, j, 0 * i], axis=1)[kept] * pitch
+    x, y = pitch * np.eye(3)[:2]
+    return np.stack([low, low + x, low + x + y, low, low + x + y, low + y], axis=1).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("corners", [soup(), holed()], ids=["a soup of tetrahedra", "a sheet with a hole"])
+def test_models_that_are_only_meshes_are_refused_in_a_sentence(corners, tmp_path):
+    faces = np.arange(len(corners)).reshape(-1, 3)
+    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in corners] + [f"f {a} {b} {c}" for a, b, c in faces + 1]
+    (tmp_path / "part.obj").write_text("\n".join(lines), encoding="utf-8")
+    nominal = load_nominal(tmp_path / "part.obj", element_size=4.0)
+    with pytest.raises(MeasurementError, match="give the STEP or IGES file"):
+        build("isogeometric", {})(None, nominal)

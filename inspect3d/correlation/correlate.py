@@ -29,7 +29,8 @@ SHAPE = (Level(6, 1000, 8, "shape"), Level(3, 100, 8, "shape"), Level(1.5, 1, 8,
 POSES = (Level(6, 0, 15, "poses"), Level(3, 0, 15, "poses"))
 JOINT = (*POSES, Level(6, 100, 8), Level(3, 1, 8), Level(1.5, 0.1, 8), Level(0, 0, 40))
 TWO_STEPS = (*POSES, *(Level(blur, 0, 20, "cameras") for blur in (3.0, 1.5, 0.0)), *SHAPE)
-"""Ways from coarse to fine: shape alone, cameras and shape together, and the paper's two steps.
+SPLINES = (SHAPE[0], SHAPE[1], SHAPE[3])
+"""Ways from coarse to fine: shape alone, cameras and shape together, the paper's two steps; and splines alone.
 
 Of cameras and shape together only the poses are brought near the nominal shape first: lenses that take its true
 deviations for errors of their own would run far off their priors.
@@ -48,7 +49,7 @@ class Correlate:
 
     Parameters
     ----------
-    levels : the way from coarse to fine; none: `SHAPE` where the cameras are known, else `JOINT`
+    levels : the way from coarse to fine; none: `SHAPE` or `SPLINES` where the cameras are known, else `JOINT`
     pixels : px of the largest picture that one evaluation point stands for
     per_edge : evaluation points along the edge of every facet, in place of `pixels`; the paper has 6
     interpolation : of the pictures between their pixels; the paper has "linear"
@@ -103,7 +104,7 @@ class Correlate:
         _require_coarse(seen, pictures, views)
         known = Freedom("known", tuple(Lens() for _ in views), tuple(views), seen.centre)
         freedom = freedom or known
-        levels = self.levels or (JOINT if freedom.unknowns else SHAPE)
+        levels = self.levels or (JOINT if freedom.unknowns else SHAPE if self.splines is None else SPLINES)
         coarse = levels[:-1] if freedom.unknowns else levels
         calibrating = tuple(takewhile(lambda level: level.moves in ON_NOMINAL, coarse))
         state = Solver(calibrating, COARSE)(seen, pictures, views, freedom, told=told)

@@ -24,7 +24,8 @@ from inspect3d.register.mobility import spread
 
 SHORTER, LONGER, LEAST, PATIENCE = 0.5, 1.2, 0.02, 4
 WORSE = 1.02  # times the variance of the residuals before it: a step that leads to more went too far
-COARSE, COARSE_FEW = 5e-4, 3e-3  # mm, for nodes by themselves, and for fewer unknowns, which go straight to the end
+COARSE = 5e-4  # mm
+FINE_FEW, COARSE_FEW = 1e-4, 3e-3  # mm, for unknowns fewer than the nodes, whose steps shrink many times each
 SETTLED = 0.005  # share of what the cameras leave open about the shape: a shorter step changes nothing of note
 RUNAWAY = 0.3  # of the extent of what is seen: a step that large leads nowhere
 VAGUE = 1e-6  # share of the stiffest motion's stiffness; softer ones are held while the shape is
@@ -97,8 +98,8 @@ class Solver:
     ----------
     levels : in their order
     tolerance : mm; the last level ends when no node moves farther in a step, or by more than half a per cent of the
-        uncertainty that unknown cameras give the shape; the others at half a micrometre, or at three where the nodes do
-        not move by themselves, times the pixels of the blur
+        uncertainty that unknown cameras give the shape; the others at half a micrometre, times the pixels of the blur.
+        Where the nodes do not move by themselves it takes a tenth of a micrometre, and three
 
     After four steps of a level, one that turns back is halved, and so are the next until they go on: where the
     pictures show a motion weakly, a full step goes too far and the next comes back. The robust weights of the facets
@@ -150,8 +151,8 @@ class Solver:
             freedom = held(freedom, poses=level.moves == "shape")
         points = scene.points.thinned(1 + int(1.5 * level.blur**2)) if level.blur >= 1 else scene.points
         final = number == len(self.levels) - 1
-        coarse = COARSE_FEW if scene.space.confined else COARSE
-        tolerance = self.tolerance if final else max(self.tolerance, coarse * max(1.0, level.blur))
+        fine, coarse = (FINE_FEW, COARSE_FEW) if scene.space.confined else (0.0, COARSE)
+        tolerance = max(self.tolerance, fine if final else coarse * max(1.0, level.blur))
         last, factor = np.zeros(len(state.motion)), 1.0
         rows = scene.space.rows(scene)
         similar: Factored | None = None

@@ -51,14 +51,9 @@ class Splines:
             The model has no exact faces, the cameras see none of those that are named, a face cannot be converted, or
             the mesh is too coarse to tell its control points apart.
         """
-        brep = nominal.exact
-        if not isinstance(brep, Brep) or nominal.surface_face is None:
-            raise MeasurementError(
-                "Isogeometric stereocorrelation moves the control points of exact faces, and this CAD model is a mesh "
-                'without any: give the STEP or IGES file, or measure with method = "stereocorrelation".'
-            )
+        brep, of_surface = exact_faces(nominal)
         centres = seen.nodes[seen.triangles].mean(axis=1)
-        face = nominal.surface_face[nominal.surface.closest(centres).triangle]
+        face = of_surface[nominal.surface.closest(centres).triangle]
         patches = self._patches(brep, seen, face)
         kept = np.isin(face, list(patches)) & seen.whole[seen.triangles].all(axis=1)
         rest, _ = seen.restricted(kept)
@@ -119,6 +114,22 @@ def _too_coarse(number: int, functions: int, nodes: int) -> str:
         f"The mesh is too coarse for face {number}: {functions} of its control points move the {nodes} nodes that two "
         "cameras see. Set element_size or `refine` lower."
     )
+
+
+def exact_faces(nominal: Nominal) -> tuple[Brep, Integers]:
+    """Return the exact part, and the face of each triangle of the nominal surface (m,).
+
+    Raises
+    ------
+    MeasurementError
+        The model has no exact faces.
+    """
+    if not isinstance(nominal.exact, Brep) or nominal.surface_face is None:
+        raise MeasurementError(
+            "Isogeometric stereocorrelation moves the control points of exact faces, and this CAD model is a mesh "
+            'without any: give the STEP or IGES file, or measure with method = "stereocorrelation".'
+        )
+    return nominal.exact, nominal.surface_face
 
 
 def telling(nodes: sparse.csr_matrix, ways: int) -> Floats:
