@@ -183,7 +183,6 @@ def test_the_cylinder_is_found_and_measured_without_a_click(multidic, frames):
     assert radius == pytest.approx(57.0, abs=0.1)
     assert radius == pytest.approx(fitted_radius(frames[0].points)[0], abs=0.02)
     assert np.sqrt(np.mean(residual**2)) < 0.020
-    assert len(found.points) > 0.9 * found.seen
 
 
 def test_frames_repeat_within_what_is_claimed(frames):
