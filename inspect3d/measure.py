@@ -57,6 +57,7 @@ class Cloud:
     normals : (n, 3), unit, out of the material as far as the instrument knows; zero or None where it does not
     noise : standard uncertainty of a point along the surface normal, mm; None: to be estimated from the cloud
     shares : (n,), standard uncertainty of each point as a share of the usual one; None: all are alike
+    noise_length : mm, over which the noise of neighbouring points is alike; 0: every point has its own
     """
 
     name: str
@@ -64,6 +65,7 @@ class Cloud:
     normals: Floats | None = None
     noise: float | None = None
     shares: Floats | None = None
+    noise_length: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", floats(self.points, "points", None, 3))
@@ -75,6 +77,8 @@ class Cloud:
             object.__setattr__(self, "shares", floats(self.shares, "shares", len(self.points)))
             if not (self.shares > 0).all():
                 raise ValueError("the uncertainty of a point is positive")
+        if self.noise_length and self.noise is None:
+            raise ValueError("noise that neighbouring points share cannot be found from their scatter: give it")
 
     def __len__(self) -> int:
         """Return the number of points."""

@@ -41,11 +41,13 @@ class Scan:
     ----------
     units : of the coordinates in the files; decisive, also where a format fixes its unit
     noise : standard uncertainty of a point along the surface normal, mm; None: estimated from the cloud
+    noise_length : mm, over which the noise of neighbouring points is alike, exp(-r² / 2 L²); wants `noise`
     frames : "one": the files share a frame and are one cloud; "separate": each file is aligned by itself
     """
 
     units: Unit = "mm"
     noise: float | None = None
+    noise_length: float = 0.0
     frames: Frames = "one"
 
     def __post_init__(self) -> None:
@@ -55,6 +57,10 @@ class Scan:
             raise ValueError(f"frames = {self.frames!r} is not known: choose one of {', '.join(get_args(Frames))}")
         if self.noise is not None and not _is_noise(self.noise):
             raise ValueError(f"noise = {self.noise!r} is not a standard noise: give a positive number in mm, or none")
+        if self.noise_length and not _is_noise(self.noise_length):
+            raise ValueError(f"noise_length = {self.noise_length!r} is no length: give a positive number, mm, or none")
+        if self.noise_length and self.noise is None:
+            raise ValueError("noise_length wants noise too: what neighbours share does not show in their scatter")
 
     def open(self, files: Files) -> ScanSource:
         """Read all files of the key `files`.
@@ -80,10 +86,15 @@ class Scan:
 
     def __call__(self, source: ScanSource, nominal: Nominal) -> Measurement:
         """Return the clouds as they were scanned, in the frame of the instrument."""
-        return Measurement(source.clouds, remarks=source.remarks)
+        alike = (
+            f"Points share their noise over {self.noise_length:g} mm, as the recipe says: a node averages it little."
+        )
+        return Measurement(source.clouds, remarks=(*source.remarks, *([alike] if self.noise_length else [])))
 
     def _cloud(self, name: str, file: CloudFile) -> Cloud:
-        return Cloud(name, file.points * _MILLIMETRES[self.units], file.normals, self.noise)
+        return Cloud(
+            name, file.points * _MILLIMETRES[self.units], file.normals, self.noise, noise_length=self.noise_length
+        )
 
     def _joined(self, clouds: list[Cloud]) -> Cloud:
         """Return all points as one cloud; those of a file without normals get zero ones, if others have them."""
@@ -94,7 +105,9 @@ class Scan:
             given = [np.zeros((len(cloud), 3)) if cloud.normals is None else cloud.normals for cloud in clouds]
             normals = np.concatenate(given)
         points = np.concatenate([cloud.points for cloud in clouds])
-        return Cloud(", ".join(cloud.name for cloud in clouds), points, normals, self.noise)
+        return Cloud(
+            ", ".join(cloud.name for cloud in clouds), points, normals, self.noise, noise_length=self.noise_length
+        )
 
 
 def _is_noise(value: object) -> bool:

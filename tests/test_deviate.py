@@ -12,6 +12,7 @@ from inspect3d.outcome import MeasurementError
 from inspect3d.pose import Pose
 from inspect3d.register.gauge import best_fit
 from inspect3d.register.register import Register
+from inspect3d.virtual.correlated_noise import correlated_noise
 from tests.jit import printed
 from tests.sheets import DEPTH, WIDTH, scanned, sheet
 
@@ -21,9 +22,9 @@ def nominal():
     return sheet()
 
 
-def deviated(nominal, points, start=None, noise=None, **settings):
+def deviated(nominal, points, start=None, noise=None, noise_length=0.0, **settings):
     """Register near the truth and measure the deviation."""
-    cloud = Cloud("scan", points, noise=noise)
+    cloud = Cloud("scan", points, noise=noise, noise_length=noise_length)
     refine = settings.get("refine", True)
     alignment = Register(nominal, start or Pose.identity(), refine)(cloud)
     counted = np.ones(len(nominal.mesh), bool)
@@ -138,6 +139,19 @@ def test_sigma_is_true(nominal):
     z = np.concatenate(z)
     assert 0.93 < np.sqrt(np.mean(z**2)) < 1.07
     assert 0.93 < np.mean(np.abs(z) < 1.96) < 0.97
+
+
+@pytest.mark.parametrize("length", [0.3, 1.5, 6.0])
+def test_sigma_is_true_where_neighbouring_points_share_their_noise(nominal, length):
+    z = []
+    for seed in range(4):
+        random = np.random.default_rng(seed)
+        points, along = scanned(random, 20_000)
+        points = points + along * 0.02 * correlated_noise(points, length, random)[:, None]
+        found = deviated(nominal, points, noise=0.02, noise_length=length)
+        seen = found.deviation.observed
+        z.append(found.deviation.value[seen] / found.deviation.sigma[seen])
+    assert 0.85 < np.sqrt(np.mean(np.concatenate(z) ** 2)) < 1.15
 
 
 def test_foreign_points_near_the_surface_do_not_pull_the_nodes(nominal):

@@ -92,6 +92,8 @@ def test_the_unit_of_the_recipe_decides_and_a_contradiction_is_remarked(tmp_path
         ({"noise": float("nan")}, "positive number in mm"),
         ({"noise": "little"}, "positive number in mm"),
         ({"noise": True}, "positive number in mm"),
+        ({"noise": 0.02, "noise_length": -1.0}, "positive number, mm"),
+        ({"noise_length": 0.5}, "wants noise too"),
     ],
 )
 def test_a_wrong_setting_is_refused_with_the_right_choices(settings: dict[str, Any], words: str) -> None:
@@ -110,7 +112,7 @@ def test_a_missing_file_is_refused_by_name(tmp_path: Path) -> None:
 
 
 def test_the_settings_are_the_provenance() -> None:
-    assert repr(Scan(units="m", noise=0.1)) == "Scan(units='m', noise=0.1, frames='one')"
+    assert repr(Scan(units="m", noise=0.1)) == "Scan(units='m', noise=0.1, noise_length=0.0, frames='one')"
 
 
 def test_a_source_is_made_of_clouds(tmp_path: Path) -> None:

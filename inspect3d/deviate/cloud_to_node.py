@@ -21,12 +21,14 @@ class NodeFit:
     variance : (n,) mm², of the value, from the scatter, number and place of the points; NaN where not observed
     observed : (n,)
     noise : mm, standard uncertainty of a point: as given, or the robust scatter of the points about the local fits
+    radius : mm, of the fits
     """
 
     value: Floats
     variance: Floats
     observed: Booleans
     noise: float
+    radius: float
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ class CloudToNode:
         chosen = np.flatnonzero(part & ~feet.on_rim)
         if not len(chosen):
             nothing = np.full(len(mesh), np.nan)
-            return NodeFit(nothing, nothing, np.zeros(len(mesh), bool), noise or np.nan)
+            return NodeFit(nothing, nothing, np.zeros(len(mesh), bool), noise or np.nan, np.nan)
         edge = mesh.edge_length
         cell = edge / 2
         low = feet.points[chosen].min(axis=0)
@@ -94,7 +96,7 @@ class CloudToNode:
         observed &= squares <= (self.unlike * max(noise, usual)) ** 2 * np.maximum(freedom, 1)
         pooled = (self.prior * noise**2 + squares) / (self.prior + freedom)
         variance = np.where(observed, pooled * np.where(observed, factor, 1.0), np.nan)
-        return NodeFit(np.where(observed, value, np.nan), variance, observed, noise)
+        return NodeFit(np.where(observed, value, np.nan), variance, observed, noise, float(radii[0, 0]))
 
     def _radii(self, mesh: InspectionMesh, keys: np.ndarray, cell: float) -> Floats:
         """Return the radii to try at each node, (n, 3) mm, from the density of the points."""

@@ -7,16 +7,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from inspect3d.arrays import Booleans, Floats
+from inspect3d.deviate.alike import with_alike_noise
 from inspect3d.deviate.cloud_to_node import CloudToNode, NodeFit
 from inspect3d.deviate.deviation import Deviation
-from inspect3d.deviate.map_covariance import Independent, MapCovariance, pose_errors
-from inspect3d.measure import Cloud
-from inspect3d.nominal.nominal import Nominal
+from inspect3d.deviate.map_covariance import Independent, MapCovariance, pose_errors, variances_without
+from inspect3d.measure import Cloud, FieldCovariance
+from inspect3d.nominal.nominal import InspectionMesh, Nominal
 from inspect3d.nominal.surface import Feet
 from inspect3d.outcome import MeasurementError, Status
 from inspect3d.register.alignment import Alignment
 from inspect3d.register.fit import Fit
-from inspect3d.register.gauge import Gauge
+from inspect3d.register.gauge import ROUNDED, Gauge
 from inspect3d.register.icp import TUKEY, median_and_scale
 from inspect3d.register.mobility import jacobian, named
 from inspect3d.register.similarity import Similarity
@@ -118,8 +119,9 @@ class Deviate:
             if np.abs(gauge.jacobian @ motion).max() < SETTLED * np.sqrt(np.median(fit.variance[seen])):
                 break
             moved = Similarity.small(motion, gauge.origin) @ moved
-        deviation = self._map(fit, value, gauge, alignments, nominal)
-        covariance = self._covariance(fit, gauge, alignments)
+        own = _own(fit, mesh, max(c.noise_length * a.scale for c, a in zip(clouds, alignments, strict=True)))
+        deviation = self._map(fit, own, value, gauge, alignments, nominal)
+        covariance = self._covariance(fit, own, gauge, alignments)
         distance = np.where(feet.on_rim, np.nan, feet.distance - self.coating)
         distance[np.abs(feet.distance) > (self.reach or np.inf)] = np.nan
         placed = self._aligned(alignments, moved, clouds, distance)
@@ -169,30 +171,40 @@ class Deviate:
         )
 
     def _map(
-        self, fit: NodeFit, value: Floats, gauge: Gauge, alignments: tuple[Alignment, ...], nominal: Nominal
+        self,
+        fit: NodeFit,
+        own: FieldCovariance,
+        value: Floats,
+        gauge: Gauge,
+        alignments: tuple[Alignment, ...],
+        nominal: Nominal,
     ) -> Deviation:
         """Return the map: the values in the gauge, and the variance of all that enters them."""
         seen = np.flatnonzero(fit.observed)
-        local = fit.variance[seen]
         coating = np.full(len(seen), self.coating_sigma)
         growth = self.scale_sigma * ((gauge.nodes - gauge.origin) * gauge.normals).sum(axis=1)
         if self.refine:
             value = value + gauge.jacobian @ gauge.motion(value)
-            variance = gauge.variances(local) + gauge(coating) ** 2 + gauge(growth) ** 2
+            left = np.maximum(variances_without(own, gauge.jacobian, gauge.solver), ROUNDED * own.variances)
+            variance = left + gauge(coating) ** 2 + gauge(growth) ** 2
         else:
             rows = jacobian(gauge.nodes, gauge.normals, alignments[0].origin)
-            variance = local + np.einsum("ij,jk,ik->i", rows, alignments[0].covariance, rows) + coating**2 + growth**2
+            variance = (
+                own.variances + np.einsum("ij,jk,ik->i", rows, alignments[0].covariance, rows) + coating**2 + growth**2
+            )
         variance = variance + self.calibration**2 + nominal.chord**2 / 3
         full_value, full_sigma = np.full(len(fit.value), np.nan), np.full(len(fit.value), np.nan)
         full_value[seen], full_sigma[seen] = value, np.sqrt(variance)
         return Deviation(full_value, full_sigma, fit.observed)
 
-    def _covariance(self, fit: NodeFit, gauge: Gauge, alignments: tuple[Alignment, ...]) -> MapCovariance:
+    def _covariance(
+        self, fit: NodeFit, own: FieldCovariance, gauge: Gauge, alignments: tuple[Alignment, ...]
+    ) -> MapCovariance:
         seen = np.flatnonzero(fit.observed)
         rows = jacobian(gauge.nodes, gauge.normals, alignments[0].origin)
         return MapCovariance(
             node=seen,
-            own=Independent(fit.variance[seen]),
+            own=own,
             pose=np.zeros((len(seen), 0)) if self.refine else pose_errors(rows, alignments[0].covariance),
             coating=(self.coating, self.coating_sigma),
             calibration=self.calibration,
@@ -241,6 +253,14 @@ def _shares(clouds: tuple[Cloud, ...]) -> Floats | None:
     if all(cloud.shares is None for cloud in clouds):
         return None
     return np.concatenate([np.ones(len(cloud)) if cloud.shares is None else cloud.shares for cloud in clouds])
+
+
+def _own(fit: NodeFit, mesh: InspectionMesh, alike: float) -> FieldCovariance:
+    """Return the covariance of the local fits, their noise `alike` over so many mm."""
+    seen = np.flatnonzero(fit.observed)
+    if not alike:
+        return Independent(fit.variance[seen])
+    return with_alike_noise(fit.variance[seen], mesh.nodes[seen], fit.noise, alike, fit.radius)
 
 
 def _common_noise(clouds: tuple[Cloud, ...], alignments: tuple[Alignment, ...]) -> float | None:
