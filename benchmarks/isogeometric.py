@@ -151,7 +151,7 @@ def _sigma(chosen: argparse.Namespace) -> None:
 
 def _told(correlate: Correlate, trial: Trial) -> tuple[Floats, Floats, float, float]:
     shape, _ = _measured(correlate, trial)
-    rough = shape.uncertainty.rough[shape.sound] > 0
+    rough = shape.uncertainty.rough[shape.sound] != 0
     return *_judged(shape, trial), float(rough.mean()), shape.uncertainty.correlated
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -63,8 +64,7 @@ class LackOfFit:
         rows : (n, k), from its motions to those of the nodes
         times : by how much the variance of the residuals is larger there
         """
-        near = self.scene.adjacency + sparse.identity(len(self.increment), format="csr")
-        around = sparse.diags(1 / np.asarray(near.sum(axis=1)).ravel()) @ near
+        near, around = self._near, self._around
         own = sparse.identity(len(self.increment), format="csr")
         mean = around @ self.increment
         variance = times * self.system.variances(own) - within.variances(rows)
@@ -79,6 +79,29 @@ class LackOfFit:
         for width in AROUND:
             found = np.maximum(found, self._restless(times, around**width))
         return np.sqrt(found)
+
+    @property
+    def sign(self) -> Floats:
+        """Return whether the solution is likely too low, 1, or too high, -1, at each node, (n,)."""
+        return np.where(self._around @ self.increment < 0, -1.0, 1.0)
+
+    @property
+    def alike(self) -> sparse.csr_matrix:
+        """Return rows A (n, n) of length one; A A' is how far errors of the model at two nodes go together.
+
+        What splines cannot follow reaches over a span between knots: its errors do not average out over a few nodes.
+        """
+        wide = self._around ** WIDTHS[-1]
+        return (sparse.diags(1 / np.sqrt(np.asarray(wide.power(2).sum(axis=1)).ravel())) @ wide).tocsr()
+
+    @cached_property
+    def _near(self) -> sparse.csr_matrix:
+        return self.scene.adjacency + sparse.identity(len(self.increment), format="csr")
+
+    @cached_property
+    def _around(self) -> sparse.csr_matrix:
+        """Return averages over each node and its neighbours, (n, n)."""
+        return sparse.diags(1 / np.asarray(self._near.sum(axis=1)).ravel()) @ self._near
 
     def _missed(self, within: System, rows: sparse.csr_matrix, times: float, bumps: sparse.csr_matrix) -> Floats:
         """Return squared sizes (n,) mm² of what the solution misses on average over bumps (n, n), a row each.

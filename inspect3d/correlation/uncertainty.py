@@ -40,7 +40,7 @@ class Systematic:
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """The covariance T (C + F F') T' + diag(m²) of the reported deviation of the scene's nodes, in mm².
+    """The covariance T (C + F F') T' + m m' ∘ A A' of the reported deviation of the scene's nodes, in mm².
 
     Where the map is smoothed the motions are S q, see `Smoothing`; C and F are S C S' and S F then.
 
@@ -54,6 +54,8 @@ class Uncertainty:
     noise : variance of the residuals where they fit, grey levels²
     correlated : κ >= 1, by which the residuals of neighbouring points add up to more than if they were independent
     smoothing : S, of a map that is smoothed
+    alike : rows A (n, n) of length one; A A' is how far the errors m of two nodes, with their signs, go together. None:
+        not at all
     """
 
     system: System
@@ -63,6 +65,7 @@ class Uncertainty:
     noise: float
     correlated: float
     smoothing: Smoothing | None = None
+    alike: sparse.csr_matrix | None = None
 
     def deviation(self, motion: Floats) -> Floats:
         """Return the deviation (n,) mm to be reported of a motion (k,)."""
@@ -92,7 +95,9 @@ class Uncertainty:
         """Return the covariance times columns (n, k)."""
         back = self.smoother.T @ columns
         smooth = self.smoother @ (self._motions.covariance(back) + self.shifts @ (self.shifts.T @ back))
-        return smooth + (self.rough**2)[:, None] * columns
+        rough = self.rough[:, None] * columns
+        shared = rough if self.alike is None else self.alike @ (self.alike.T @ rough)
+        return smooth + self.rough[:, None] * shared
 
     def variances_without(self, modes: Floats, solver: Floats) -> Floats:
         """Return the diagonal for the field less its modes, (I - J M) v: J = `modes` (n, k) and M = `solver` (k, n)."""
@@ -148,14 +153,15 @@ def uncertainty(
     noise = noise_of(left, weights * summed.fitted, round(unknowns * summed.fitted.mean()))
     total = noise * summed.correlated
     system = system_of(scene, found, factors, total, freedom, columns, scale, slides)
-    rough = unresolved(scene, left, total, summed.fitted)
+    rough, alike = unresolved(scene, left, total, summed.fitted), None
     if scene.space.confined:
-        rough = np.hypot(rough, lack.size(system, rows, total / before))
+        rough, alike = lack.sign * np.hypot(rough, lack.size(system, rows, total / before)), lack.alike
     shifts = np.zeros((len(system.cross), 0))
     if systematic is not None:
         shares = weights * found.clean / total
         shifts = _shifts(scene, found, shares, system, mixing, columns, systematic)
-    return Uncertainty(system, shifts, scene.space.smoother(scene, weights), rough, noise, summed.correlated)
+    smoother = scene.space.smoother(scene, weights)
+    return Uncertainty(system, shifts, smoother, rough, noise, summed.correlated, alike=alike)
 
 
 def _shifts(
