@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from inspect3d.arrays import Booleans, Floats
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.system import System
 
-TOO_MUCH = 3.0  # times the usual squared score of the facets around a node; noise hardly ever makes as much
+CHANCE = 1e-4  # of noise making a node look as if the elements did not fit around it
+SELDOM = 0.03  # the same beside places where they do not fit
 FITTING = 10.0  # per cent of the facets that fit at least
 ROUNDS = 10
 RIDGE = 1e-9
@@ -35,37 +37,42 @@ class Misfit:
 def misfit(scene: Scene, found: Facets, weights: Floats, system: System, mixing: Floats) -> Misfit:
     """Return how the residuals add up.
 
-    The ratio of scores to what is expected is taken over the facets around each node. Where that is more than three
-    times κ the elements do not fit: a step or a crease runs through them. Facets that touch such a node do not count
-    for κ, which is what the others have.
+    The ratio of scores to what is expected is taken over the facets around each node. Where it is more than κ times
+    what noise reaches in one node of ten thousand, the elements do not fit: a step or a crease runs through them.
+    Facets that touch such a node do not count for κ, which is what the others have.
 
     Parameters
     ----------
     weights : (f,) of the facets over the variance of the residuals
     mixing : see `Freedom.spread`
     """
-    squares, expected = _scores(scene, found, weights, system, mixing)
+    squares, expected, spread = _scores(scene, found, weights, system, mixing)
     counted = expected > 0
     if not counted.any():
         return Misfit(1.0, np.ones(len(weights), dtype=bool))
-    corners = scene.triangles.ravel()
-    sums = [np.bincount(corners, np.repeat(values, 3), minlength=len(scene.nodes)) for values in (squares, expected)]
-    ratio = np.divide(sums[0], sums[1], out=np.zeros(len(scene.nodes)), where=sums[1] > 0)
-    worst = ratio[scene.triangles].max(axis=1)
-    usual = max(1.0, float(np.percentile(worst[counted], FITTING)))
+    corners, n = scene.triangles.ravel(), len(scene.nodes)
+    sums = [np.bincount(corners, np.repeat(values, 3), minlength=n) for values in (squares, expected, spread)]
+    known = sums[2] > 0
+    ratio = np.divide(sums[0], sums[1], out=np.zeros(n), where=known)
+    degrees = np.divide(sums[1] ** 2, sums[2], out=np.ones(n), where=known)
+    beyond = ratio * degrees / chi2.isf(CHANCE, degrees)
+    usual = max(1.0, float(np.percentile(ratio[scene.triangles].max(axis=1)[counted], FITTING)))
+    worst = beyond[scene.triangles].max(axis=1)
     for _ in range(ROUNDS):
-        fitted = counted & (worst <= TOO_MUCH * usual)
+        fitted = counted & (worst <= usual)
         before, usual = usual, max(1.0, float(squares[fitted].sum() / expected[fitted].sum()))
         if usual == before:
             break
-    return Misfit(usual, worst <= TOO_MUCH * usual)
+    return Misfit(usual, worst <= usual)
 
 
 def unresolved(scene: Scene, found: Facets, noise: float, fitted: Booleans) -> Floats:
     """Return the standard uncertainty (n,) mm of nodes whose facets the elements do not fit; 0 elsewhere.
 
     Alone, a facet with the normal matrix K and the score s would move its nodes by K⁻¹ s. For noise of the variance v
-    that has the variance v K⁻¹; by what it is more, the facets around a node do not agree about where it is.
+    that has the variance v K⁻¹; by what it is more, the facets around a node do not agree about where it is. A few
+    facets tell that badly: a node among facets of which none fits has the mean over its neighbours where that is more,
+    and one that facets which fit touch as well has it only where noise seldom does as much.
 
     Parameters
     ----------
@@ -78,17 +85,30 @@ def unresolved(scene: Scene, found: Facets, noise: float, fitted: Booleans) -> F
     precision = 1 / (noise * np.einsum("fii->fi", inverse).ravel())
     excess = np.bincount(corners, precision * alone**2 - 1, minlength=n)
     known = np.bincount(corners, precision, minlength=n)
-    touched = np.bincount(corners, np.repeat(~fitted, 3), minlength=n) > 0
-    return np.where(touched, np.sqrt(np.maximum(excess / known, 0.0)), 0.0)
+    facets = np.bincount(corners, minlength=n)
+    unfitted = np.bincount(corners, np.repeat(~fitted, 3), minlength=n)
+    wide = [np.bincount(corners, np.repeat(v[scene.triangles].sum(axis=1), 3), minlength=n) for v in (excess, known)]
+    within = np.maximum(excess / known, wide[0] / wide[1])
+    clear = (unfitted > 0) & (excess > chi2.isf(SELDOM, facets) - facets)
+    squared = np.where(unfitted == facets, within, np.where(clear, excess / known, 0.0))
+    return np.sqrt(np.maximum(squared, 0.0))
 
 
-def _scores(scene: Scene, found: Facets, weights: Floats, system: System, mixing: Floats) -> tuple[Floats, Floats]:
-    """Return of each facet the squared score |J'W r|², and what it would be for independent residuals, (f,).
+def _scores(
+    scene: Scene, found: Facets, weights: Floats, system: System, mixing: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Return of each facet the squared score |J'W r|², what it would be for independent residuals, and its spread.
 
-    That is the trace of K - K* C K*' with K (3, 3) the facet's normal matrix, K* its rows over all unknowns and C the
-    covariance of all unknowns: a fit follows its data. Facets that do not count, or less than others, have zeros.
+    For those the score has the covariance M = K - K* C K*' with K (3, 3) the facet's normal matrix, K* its rows over
+    all unknowns and C the covariance of all unknowns: a fit follows its data. Expected is tr M, and the spread, half
+    the variance, tr M². Sums over facets compare with chi-square of (sum tr M)² / (sum tr M²) degrees of freedom.
+    Facets that do not count, or less than others, have zeros.
+
+    Notes
+    -----
+    F. E. Satterthwaite, "An approximate distribution of estimates of variance components", Biometrics Bulletin 2, 1946.
     """
-    squares, expected = np.zeros(len(weights)), np.zeros(len(weights))
+    squares, expected, spread = np.zeros((3, len(weights)))
     trusted = (found.freedom > 0) & (weights >= 0.999 * weights.max())
     space, scale = scene.space, weights[trusted, None, None]
     node, cross = found.node[trusted] * scale, found.cross[trusted] * scale @ mixing
@@ -97,10 +117,11 @@ def _scores(scene: Scene, found: Facets, weights: Floats, system: System, mixing
     held = space.at_corners(scene, solved)[trusted]
     within = space.blocks(scene, system.motion)[trusted] - held @ inverse @ held.transpose(0, 2, 1)
     within += following @ cameras @ following.transpose(0, 2, 1)
-    between = -following @ cameras
-    explained = np.einsum("fij,fjk,fik->f", node, within, node)
-    explained += 2 * np.einsum("fij,fjk,fik->f", node, between, cross)
-    explained += np.einsum("fij,jk,fik->f", cross, cameras, cross)
+    between = node @ following @ cameras @ cross.transpose(0, 2, 1)
+    explained = node @ within @ node - between - between.transpose(0, 2, 1)
+    explained += cross @ cameras @ cross.transpose(0, 2, 1)
+    left = node - explained
     squares[trusted] = ((found.right[trusted] * scale[:, :, 0]) ** 2).sum(axis=1)
-    expected[trusted] = np.einsum("fii->f", node) - explained
-    return squares, expected
+    expected[trusted] = np.einsum("fii->f", left)
+    spread[trusted] = (left**2).sum(axis=(1, 2))
+    return squares, expected, spread
