@@ -124,7 +124,8 @@ def _run(finished: Finished, names: Mapping[str, str]) -> _Run:
                 errors = read_errors(finished.folder / f"{name}_errors.npz")
                 mesh = replace(found.mesh, face=errors.face)
                 part = replace(part, covariance=errors.covariance, sources=errors.sources, **_map(found))
-                part = replace(part, sensitivity=_sensitivity(values["sensitivity"], part.alignments[0], mesh))
+                if values["sensitivity"] is not None:
+                    part = replace(part, sensitivity=_sensitivity(values["sensitivity"], part.alignments[0], mesh))
                 if part.deviation is not None:
                     part = replace(part, regions=Segmentation()(part.deviation, errors.covariance, mesh))
                 part = replace(part, **_points(finished.folder / f"{name}_points.vtp"))
