@@ -126,11 +126,14 @@ class Setup:
             return load_nominal(path, element_size=self.element)
 
     def trials(self, case: Case, seeds: range) -> Iterator[Trial]:
-        """Yield one trial for each seed: noise, gain and beliefs are new in each, the speckle in every third."""
-        drawn = -1
+        """Yield one trial for each seed: noise, gain and beliefs are new in each, the speckle in every third.
+
+        Where there is a systematic shift it is new in each, and so is the speckle.
+        """
+        drawn, same = -1, SAME_SPECKLE if self.tau == 0.0 else 1
         for seed in seeds:
-            if seed - seed % SAME_SPECKLE != drawn:
-                drawn = seed - seed % SAME_SPECKLE
+            if seed - seed % same != drawn:
+                drawn = seed - seed % same
                 dataset = self.dataset(drawn)
                 scene = Scene(dataset.part.surface(), dataset.deviation, dataset.speckle)
                 light = [camera.light(scene) for camera in dataset.cameras]

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from inspect3d.correlation.disagreement import disagreement
+from inspect3d.correlation.disagreement import at_least, disagreement
 from inspect3d.correlation.freedom import Freedom, Lens, Stand
 from inspect3d.correlation.picture import Pictures
 from inspect3d.correlation.scene import scene
 from inspect3d.correlation.texture import speckle_size
+from inspect3d.correlation.uncertainty import Systematic
 from tests.sheets import sheet
 from tests.speckled import Speckle, photographed, picture, rig
 
@@ -45,6 +46,21 @@ def test_pictures_disagree_by_the_shift_that_the_shape_cannot_explain(size):
     found = disagreement(seen, Pictures(grey).sharp, views, np.zeros(len(seen.nodes)))
     shown = shift[60:-60, 60:-60]
     assert found == pytest.approx(np.sqrt((shown**2).mean() / 2), rel=0.15, abs=0.003)  # shared out to both pictures
+
+
+@pytest.mark.parametrize("length", [6.0, 15.0, 60.0])
+def test_a_stated_shift_is_not_made_larger_by_chance(length):
+    seen = scene(sheet(edge=6.0), rig(), 5.0, STEEPEST, [None, None])
+    stated = Systematic(0.02, length)
+    centres = seen.nodes[seen.triangles].mean(axis=1)
+    squared = ((centres[:, None] - centres[None]) ** 2).sum(axis=2)
+    values, vectors = np.linalg.eigh(np.exp(-squared / (2 * length**2)))
+    random = np.random.default_rng(0)
+    fields = (vectors * np.sqrt(np.maximum(values, 0))) @ random.normal(size=(len(values), 3000))
+    sizes = stated.size * np.sqrt((fields**2).mean(axis=0))
+    larger = np.mean([at_least(stated, size, seen).size > stated.size for size in sizes])
+    assert 0.002 < larger < 0.03
+    assert at_least(stated, 4 * stated.size, seen).size == 4 * stated.size
 
 
 def test_the_stands_of_a_rig_that_move_as_one_move_the_part():

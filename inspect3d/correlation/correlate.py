@@ -10,7 +10,7 @@ import numpy as np
 
 from inspect3d.arrays import Booleans, Floats
 from inspect3d.camera import View
-from inspect3d.correlation.disagreement import disagreement
+from inspect3d.correlation.disagreement import at_least, disagreement
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.hidden import hidden_motions
 from inspect3d.correlation.normal import Facets, facets
@@ -57,7 +57,7 @@ class Correlate:
     steepest : degrees, largest angle between a normal and the line of sight
     poorest : least correlation coefficient of a facet that counts
     systematic : a smooth systematic shift of the pictures, carried into the uncertainty; where the pictures disagree by
-        more than it explains, by as much as they do
+        more than a shift of that size may by chance, by as much as they do
     smoothing : stiffness of a plate that smooths the map when it has been found, in medians of the nodes' own; 0: none
     splines : nodes move as the control points of the CAD's own NURBS faces have it; none: each by itself
     """
@@ -127,8 +127,7 @@ class Correlate:
             found = self._found(seen, pictures, state, last)
         systematic = self.systematic
         if systematic is not None:
-            floor = disagreement(seen, pictures.sharp, state.views, state.motion)
-            systematic = replace(systematic, size=max(systematic.size, floor))
+            systematic = at_least(systematic, disagreement(seen, pictures.sharp, state.views, state.motion), seen)
         sure = uncertainty(seen, found, state.views, state.weights, last, systematic)
         local = float(np.sqrt(np.median(sure.system.motion.quadratic(seen.space.rows(seen)))))
         motions = hidden_motions(seen, sure.system, last, local)
