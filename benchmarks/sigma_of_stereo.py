@@ -5,11 +5,12 @@
     python benchmarks/sigma_of_stereo.py known --tau 0.02 --length 25 --stated
 
 Every seed draws noise, gain and offset, and what is believed of the cameras, around the truth, and every third one the
-speckle and the rig too; with a systematic shift every one does, so that the shift is new in each. z is (found - true) / sigma at the observed nodes; `raw` in the solver's gauge, `rest` once the
-motions listed as hidden or weak are projected out of error and covariance; `weak` is their squared Mahalanobis distance
-over its mean, with the 99 % limit; `node` the 5th and 95th percentile, over the nodes, of scatter over sigma; `naive`
-the z of what each picture's own gradients and s² times the inverse claim, raw and rest. Errors are rms, sigmas rms
-(raw) and median (rest); `observed` counts the nodes of which every evaluation point is seen.
+speckle and the rig too; with a systematic shift every one does, so that the shift is new in each. z is
+(found - true) / sigma at the observed nodes; `raw` in the solver's gauge, `rest` once the motions listed as hidden or
+weak are projected out of error and covariance; `weak` is their squared Mahalanobis distance over its mean, with the
+99 % limit; `node` the 5th and 95th percentile, over the nodes, of scatter over sigma; `naive` the z of what each
+picture's own gradients and s² times the inverse claim, raw and rest. Errors are rms, sigmas rms (raw) and median
+(rest); `observed` counts the nodes of which every evaluation point is seen.
 """
 
 from __future__ import annotations
