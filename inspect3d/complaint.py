@@ -16,6 +16,7 @@ _WANTED = {
     "int_from_float": "a whole number",
     "bool_type": "true or false",
     "string_type": "a text in quotes",
+    "string_too_short": "a text",
     "tuple_type": "a list in square brackets",
     "model_type": "a table",
     "dict_type": "a table",

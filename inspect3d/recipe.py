@@ -91,7 +91,9 @@ class MeasurementTable(BaseModel):
     def _landmarks_of_a_cloud(cls, data: Any) -> Any:
         """Take `landmarks` with a `measured` point into the alignment: those with `pixels` are the plugin's."""
         landmarks = data.get("landmarks") if isinstance(data, dict) else None
-        of_cloud = isinstance(landmarks, list | tuple) and any("measured" in point for point in landmarks)
+        of_cloud = isinstance(landmarks, list | tuple) and any(
+            isinstance(point, dict) and "measured" in point for point in landmarks
+        )
         if not (of_cloud and isinstance(data.get("alignment", {}), dict)):
             return data
         alignment = {"landmarks": landmarks, **data.get("alignment", {})}

@@ -149,6 +149,13 @@ def test_units_scale_a_mesh_to_millimetres(tmp_path: Path, units: str, factor: f
     assert nominal.diagonal == pytest.approx(np.sqrt(14) * factor)
 
 
+@pytest.mark.parametrize("size", [1e-3, 1e-9, 1e-200])
+def test_elements_too_small_for_any_computer_are_refused_before_they_are_made(tmp_path: Path, size: float) -> None:
+    trimesh.creation.box((3.0, 2.0, 1.0)).export(tmp_path / "block.stl")
+    with pytest.raises(InputError, match=r"5 million nodes: this part takes 0\.0023 mm or more"):
+        load_nominal(tmp_path / "block.stl", element_size=size)
+
+
 def test_wrong_arguments_are_refused_in_a_sentence(tmp_path: Path) -> None:
     trimesh.creation.box((3.0, 2.0, 1.0)).export(tmp_path / "block.stl")
     for settings in ({"units": "furlong"}, {"element_size": -1.0}, {"element_size": float("nan")}):

@@ -100,6 +100,16 @@ def test_too_few_picks_and_picks_on_a_line_are_refused(points, says):
         placed_by_picks(seen(views, points), (), cameras(views), free(views))
 
 
+def test_picks_that_were_all_made_at_one_place_are_refused():
+    views = rig()
+    there = np.full((len(POINTS), 2), 100.0)
+    picks = Picks(POINTS, np.stack([views[0].project(POINTS), there], axis=1))
+    with pytest.raises(MeasurementError, match="all picked at one place"):
+        placed_by_picks(picks, (), cameras(views), free(views))
+    with pytest.raises(MeasurementError, match="all picked at one place"):
+        view_from_dlt(POINTS, there, (620, 480), NODES)
+
+
 def test_six_deep_picks_give_the_projection_matrix():
     camera = Camera(np.array([[900, 0, 500], [0, 905, 400], [0, 0, 1.0]]), np.zeros(5), (1000, 800))
     view = View(camera, Pose(np.eye(3), np.array([-30.0, -20.0, 120.0])))

@@ -133,6 +133,7 @@ def test_a_right_recipe_keeps_its_values_and_where_it_came_from(folder):
         ("limits = [-0.2, 0.2]", "limits = [0.2, 0.2]", "report.limits"),
         ('name = "P1", ', "", "report.labels[no. 1].name: missing"),
         ("[report]", "[[report]]", "report: wants a table"),
+        ('name = "Pawn ring"', 'name = ""', 'part.name: wants a text, not ""'),
         ("schema = 1", "schema = 1\nmeasurements = []\n[x]\n", "is not valid TOML"),
     ],
 )
@@ -159,6 +160,13 @@ def test_the_landmarks_of_a_cloud_may_stand_beside_the_alignment(folder):
     stereo = load(folder, RECIPE.replace('files = "a.ply"', beside)).measurements[1]
     assert len(stereo.alignment.landmarks) == 3
     assert "landmarks" not in stereo.settings
+
+
+def test_landmarks_that_are_no_tables_are_a_setting_of_the_method(folder):
+    stereo = load(
+        folder, RECIPE.replace('files = "a.ply"', 'files = "a.ply"\nlandmarks = [1, "measured"]')
+    ).measurements[1]
+    assert stereo.settings["landmarks"] == (1, "measured")
 
 
 def test_the_landmarks_of_pictures_belong_to_the_method(folder):

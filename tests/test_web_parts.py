@@ -89,7 +89,9 @@ def test_a_click_into_an_ellipse_snaps_to_its_centre_within_a_tenth_of_a_pixel()
 def test_where_there_is_nothing_a_click_snaps_to_nothing():
     grey = 100 + np.random.default_rng(1).normal(0, 2.0, (160, 160))
     assert ellipse_near(grey, 80, 80) is None
-    assert corner_near(grey, -500, -500) is None
+    for beside in ((-500, -500), (1e9, 80)):
+        assert corner_near(grey, *beside) is None
+        assert ellipse_near(grey, *beside) is None
     edge = drawn(lambda u, v: u > 80)
     found = corner_near(edge, 20, 20)
     assert found is None or np.hypot(found.x - 20, found.y - 20) <= 12
@@ -137,6 +139,7 @@ def test_unfinished_pairs_are_left_out_and_nonsense_is_refused():
         {"cad": [1, 2]},
         {"cad": [1, 2, float("nan")]},
         {"cad": [1, 2, True]},
+        {"cad": [1, 2, 10**400]},
         {"shown": [["4", 5], [6, 7]]},
     )
     for body in (None, [], {}, {"pairs": [1]}, *({"pairs": [{**whole, **each}]} for each in wrong)):

@@ -22,9 +22,18 @@ def _told(request: Request) -> Answer:
     return Answer.json(request.body)
 
 
+def _broken(request: Request) -> Answer:
+    raise ZeroDivisionError("division by zero")
+
+
 @pytest.fixture
 def server():
-    page = Page("view", ("view.html", "view.js", "surface.js", "page.css"), {"count": _counted}, {"tell": _told})
+    page = Page(
+        "view",
+        ("view.html", "view.js", "surface.js", "page.css"),
+        {"count": _counted, "broken": _broken},
+        {"tell": _told},
+    )
     with serving(page) as started:
         yield started
 
@@ -132,6 +141,12 @@ def test_a_wrong_parameter_is_refused_in_words(server):
     for number in ("3", "-1", "x", "", "1e3", "9" * 50):
         status, words, _ = asked(server, "GET", f"/count?number={number}", Cookie=cookie)
         assert (status, words) == (422, f"number = {number!r} chooses none of 3.")
+
+
+def test_a_mistake_of_ours_is_told_the_page_and_does_not_look_like_a_server_that_is_gone(server):
+    status, words, _ = asked(server, "GET", "/broken", Cookie=let_in(server))
+    assert status == 500
+    assert words.startswith("inspect3d made a mistake of its own (ZeroDivisionError: division by zero)")
 
 
 def test_every_server_has_a_port_of_its_own():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import signal
 import subprocess
@@ -23,6 +24,7 @@ from inspect3d.recipe import load_recipe
 from inspect3d.report.maps import map_polydata
 from inspect3d.report.results import as_json, results
 from inspect3d.web.notebook import Results
+from inspect3d.web.page import Request
 from inspect3d.web.view_page import view_of
 from tests.browsing import browser, drawn, opened, serving
 from tests.test_report import NASTY, a_record
@@ -230,6 +232,12 @@ def test_a_broken_map_is_told_on_the_terminal_and_the_others_are_shown(out, tmp_
     (broken / "laser.vtp").unlink()
     with pytest.raises(InputError, match=r"laser\.vtp is missing"):
         view_of([broken], None)
+    shutil.copy(out / "stereo.vtp", broken)
+    rest = view_of([broken], None)
+    assert [each.name for each in rest.shown] == ["stereo"]
+    assert json.loads(rest.map(Request("map", {"map": "0"})).body)["geometry"] == 0
+    without = {each["name"]: each["reason"] for each in json.loads(rest.maps(Request("maps", {})).body)["without"]}
+    assert without["laser"] == f"{broken / 'laser.vtp'} is missing: run the inspection again."
 
 
 def test_ctrl_c_stops_the_server_cleanly_and_the_page_left_open_says_so(chromium, out):

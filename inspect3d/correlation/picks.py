@@ -71,7 +71,7 @@ def placed_by_picks(picks: Picks, views: Sequence[View | None], cameras: Sequenc
     Raises
     ------
     MeasurementError
-        There are fewer than four picks, they lie on one line, or they do not fit the part.
+        There are fewer than four picks, they lie on one line or in one place, or they do not fit the part.
     """
     if len(picks) < FEWEST:
         raise MeasurementError(
@@ -79,6 +79,8 @@ def placed_by_picks(picks: Picks, views: Sequence[View | None], cameras: Sequenc
             f"{FEWEST - len(picks)} more, far apart from each other."
         )
     _require_spread(picks.points_cad)
+    for pixels in picks.pixels.swapaxes(0, 1):
+        _require_apart(pixels)
     if freedom.poses == "common":
         start = _rig_at(picks, [view for view in views if view], cameras)
     else:
@@ -122,6 +124,7 @@ def view_from_dlt(points_cad: Floats, pixels: Floats, size: tuple[int, int], nod
             f"A projection matrix takes {FEWEST_DLT} picks, and there are {len(points_cad)}: pick more, or give a "
             "rough `focal`."
         )
+    _require_apart(pixels)
     space, plane = _normaliser(points_cad), _normaliser(pixels)
     x, u = _homogeneous(points_cad) @ space.T, _homogeneous(pixels) @ plane.T
     rows = _dlt_rows(x, u)
@@ -141,6 +144,11 @@ def _require_spread(points: Floats) -> None:
     widths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if widths[1] < 1e-2 * widths[0]:
         raise MeasurementError("The landmarks lie on one line or in one point of the CAD: pick some off it.")
+
+
+def _require_apart(pixels: Floats) -> None:
+    if np.ptp(pixels, axis=0).max() < PICKED:
+        raise MeasurementError("The landmarks were all picked at one place of a picture: pick them where they appear.")
 
 
 def _require_fit(errors: Floats, views: Sequence[View]) -> None:

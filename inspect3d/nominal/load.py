@@ -19,6 +19,7 @@ _ELEMENTS_PER_DIAGONAL = 60
 _CHORD_PER_DIAGONAL = 1e-5
 _CHORDS_PER_ELEMENT = 50
 _FEW_TRIANGLES, _MOST_TRIANGLES = 60_000, 2_000_000
+_MOST_NODES = 5e6  # of an inspection mesh: more take hours, and tens of gigabytes
 _FINER = 8.0  # by which a surface of few triangles is made finer: the number grows in proportion at the most
 _MILLIMETRES = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "inch": 25.4, "ft": 304.8}
 
@@ -39,7 +40,7 @@ def load_nominal(
     Raises
     ------
     InputError
-        The file is missing, broken, of another kind, or holds nothing to inspect.
+        The file is missing, broken, of another kind, or holds nothing to inspect; or the elements are far too small.
     """
     path = Path(path)
     if path.is_dir():
@@ -62,10 +63,22 @@ def _exact(path: Path, name: str, element_size: float | None, flip: bool) -> Nom
         brep = brep.turned()
         fine = _fine(brep)
     surface = Surface(fine.vertices, fine.triangles)
-    size = element_size or surface.diagonal / _ELEMENTS_PER_DIAGONAL
+    size = _element_size(surface, element_size)
     mesh, remarks = mesh_on_brep(tessellated(brep, size / _CHORDS_PER_ELEMENT), size)
     remarks += _remarks_on(brep, fine, is_open, flip)
     return Nominal(name, surface, mesh, fine.chord, remarks, brep, fine.face)
+
+
+def _element_size(surface: Surface, wanted: float | None) -> float:
+    """Return the edge length of the inspection mesh, mm; each node of equilateral triangles has √3/2 of its square."""
+    size = wanted or surface.diagonal / _ELEMENTS_PER_DIAGONAL
+    least = float(np.sqrt(surface.areas.sum() / (np.sqrt(0.75) * _MOST_NODES)))
+    if size < least:
+        raise InputError(
+            f"element_size = {size:g} mm makes more than {_MOST_NODES / 1e6:g} million nodes: this part takes "
+            f"{least:.2g} mm or more."
+        )
+    return size
 
 
 def _fine(brep: Brep) -> Tessellation:
@@ -103,5 +116,5 @@ def _triangulated(path: Path, name: str, units: str, element_size: float | None,
     millimetres = _MILLIMETRES[found.units or units]
     mended = repaired(path.name, found.vertices * millimetres, found.triangles, flip)
     surface = Surface(mended.vertices, mended.triangles)
-    mesh, remarks = mesh_on_surface(surface, element_size or surface.diagonal / _ELEMENTS_PER_DIAGONAL)
+    mesh, remarks = mesh_on_surface(surface, _element_size(surface, element_size))
     return Nominal(name, surface, mesh, 0.0, (*found.remarks, *mended.remarks, *remarks))

@@ -12,6 +12,8 @@ from inspect3d.outcome import InputError
 
 MOST = 500
 """Pairs anybody picks."""
+MOST_SIZE = 1e12
+"""mm or px, of a coordinate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +66,11 @@ def pairs_of(body: Any, places: int, dimension: int) -> Pairs:
 
 
 def _numbers(value: Any, count: int) -> list[float]:
-    if not (isinstance(value, list) and len(value) == count and all(_is_number(each) for each in value)):
+    if not (isinstance(value, list) and len(value) == count and all(map(is_number, value))):
         raise InputError("The page sent a pair that is not made of numbers.")
     return [float(each) for each in value]
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))
+def is_number(value: Any) -> bool:
+    """Tell whether what a page sent is a finite number, of a size that a coordinate may have."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < MOST_SIZE

@@ -37,6 +37,7 @@ HEADERS = {
 SPENT = "This address has been used, or its token is wrong. Stop the command and start it again for a new one."
 STRANGE = "This request did not come from the page."
 NOTHING = "There is nothing here."
+OWN_MISTAKE = "inspect3d made a mistake of its own ({}: {}); please report it."
 
 
 @dataclass
@@ -162,6 +163,9 @@ class _Handler(BaseHTTPRequestHandler):
             answer = known[request.name](request)
         except (InspectionError, OSError) as error:
             self._refuse(HTTPStatus.UNPROCESSABLE_ENTITY, str(error))
+            return
+        except Exception as error:
+            self._refuse(HTTPStatus.INTERNAL_SERVER_ERROR, OWN_MISTAKE.format(type(error).__name__, error))
             return
         self._send(HTTPStatus.OK, answer)
 

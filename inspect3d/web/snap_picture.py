@@ -85,6 +85,8 @@ def ellipse_near(grey: Floats, x: float, y: float) -> Snapped | None:
 
     half = max(int(MOST * max(grey.shape)), LEAST_WINDOW)
     window, left, top = _window(grey, x, y, half)
+    if not window.size:
+        return None
     smooth = cv2.GaussianBlur(window, (0, 0), 1.5)
     low, high = np.percentile(smooth, [2, 98])
     found = None

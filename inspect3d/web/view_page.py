@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from threading import RLock
 from typing import Any
@@ -25,6 +26,7 @@ from inspect3d.report.finished import Finished, FinishedMap, open_results
 from inspect3d.report.screenshot import field_scale
 from inspect3d.web.coarse import coarse_triangles
 from inspect3d.web.page import Answer, Page, Request
+from inspect3d.web.pairs import is_number
 from inspect3d.web.palettes import palettes
 from inspect3d.web.recipe_text import change_recipe, report_table, set_rows
 
@@ -62,10 +64,10 @@ class View:
     _comparisons: dict[int, Comparison] = field(default_factory=dict)
     _lock: RLock = field(default_factory=RLock)
 
-    @property
+    @cached_property
     def shown(self) -> list[Shown]:
-        """Return all maps in the order of the page."""
-        return [Shown(finished, name) for finished in self.finished for name in finished.with_map]
+        """Return the maps that can be shown, in the order of the page."""
+        return [Shown(each, name) for each in self.finished for name in each.with_map if name not in each.damaged]
 
     @property
     def damaged(self) -> list[str]:
@@ -94,10 +96,10 @@ class View:
                 "limits": self._limits(),
                 "maps": [_words(each, several) for each in self.shown],
                 "without": [
-                    {"name": name, "reason": each["reason"] or Status(each["status"]).words}
+                    {"name": name, "reason": finished.damaged.get(name, each["reason"]) or Status(each["status"]).words}
                     for finished in self.finished
                     for name, each in finished.values["measurements"].items()
-                    if name not in finished.with_map
+                    if name not in finished.with_map or name in finished.damaged
                 ],
                 "recipe": self.recipe.name if self.recipe else None,
                 "labels": self._labels(),
@@ -300,7 +302,7 @@ def _flags(body: Any) -> list[tuple[str, list[float]]]:
     flags = []
     for row in rows:
         point = row.get("point") if isinstance(row, dict) else None
-        if not (isinstance(point, list) and len(point) == 3 and all(isinstance(x, int | float) for x in point)):
+        if not (isinstance(point, list) and len(point) == 3 and all(map(is_number, point))):
             raise InputError("The page sent a flag without a point.")
         flags.append((str(row.get("name", "")).strip(), [round(float(x), 4) for x in point]))
     return flags
