@@ -170,6 +170,7 @@ def _of_nodes(
         ),
         views=found.views,
         residual=measurement.residual,
+        unresolved=measurement.unresolved,
         hidden=measurement.hidden,
         contributions=measurement.contributions,
         figures=measurement.figures,

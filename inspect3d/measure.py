@@ -143,6 +143,7 @@ class NodalMeasurement:
     symmetric : whether the part would look the same in another place, of which the method took one
     views : the cameras in the CAD frame, if it has any
     residual : (n,) normalised grey-level residual at every node of the mesh, NaN where there is none
+    unresolved : (n,), nodes of the mesh whose shape is finer than the method resolves; None: it does not look for such
     hidden : the motions that the data cannot tell, in words
     weak : (k, w) what those of them that change `value` do to it, a column each, of any size
     contributions : to the uncertainty: source, size with its unit, and how it enters
@@ -161,6 +162,7 @@ class NodalMeasurement:
     symmetric: bool = False
     views: tuple[View, ...] = ()
     residual: Floats | None = None
+    unresolved: Booleans | None = None
     hidden: tuple[str, ...] = ()
     weak: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     contributions: tuple[tuple[str, str, str], ...] = ()

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from inspect3d.arrays import Floats, Integers
+from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.camera import View
 from inspect3d.compare.comparison import Comparison
 from inspect3d.compare.deviation_region import DeviationRegion
@@ -47,6 +47,7 @@ class MeasuredPart:
     noise : mm, standard uncertainty of a measured point; None for stereo methods
     views : the cameras in the CAD frame; empty for methods without
     residual : (n,) normalised grey-level residual at the nodes of the mesh, NaN where there is none; None for clouds
+    unresolved : (n,), nodes of the mesh whose shape is finer than the method resolves; None: it does not look for such
     hidden : the motions that the data cannot tell, in words
     contributions : of the method to the uncertainty: source, size with its unit, and how it enters
     figures : what the report shows of the way there
@@ -74,6 +75,7 @@ class MeasuredPart:
     noise: float | None = None
     views: tuple[View, ...] = ()
     residual: Floats | None = None
+    unresolved: Booleans | None = None
     hidden: tuple[str, ...] = ()
     contributions: tuple[tuple[str, str, str], ...] = ()
     figures: tuple[Figure, ...] = ()

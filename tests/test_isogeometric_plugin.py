@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
+
 import cv2
 import numpy as np
 import pytest
+import pyvista
 
 from inspect3d.files.calibration import Rig
 from inspect3d.files.calibration_json import write_calibration_json
@@ -58,6 +61,16 @@ def test_the_map_has_the_true_deviation_and_its_uncertainty(inspected):
     error = part.deviation.value[seen] - within(*nominal.mesh.nodes[seen, :2].T)
     assert np.median(np.abs(error)) < 0.001
     assert 0.75 < rms(error / part.deviation.sigma[seen]) < 1.25
+
+
+def test_nodes_that_the_splines_do_not_follow_are_flagged_in_map_table_and_figures(inspected):
+    part, _, out = inspected
+    flags = np.asarray(pyvista.read(out / "nurbs.vtp").point_data["unresolved"])
+    assert flags.dtype == np.uint8
+    assert np.array_equal(flags > 0, part.unresolved)
+    found = json.loads((out / "results.json").read_text(encoding="utf-8"))["measurements"]["nurbs"]["unresolved"]
+    assert found["nodes"] == flags.sum()
+    assert 0 <= found["share_of_observed_area"] < 0.03
 
 
 def test_the_measured_surface_is_left_as_step(inspected):

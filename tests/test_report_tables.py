@@ -50,6 +50,9 @@ def test_a_map_without_tolerance_has_no_verdict_and_one_of_pictures_has_its_resi
     table = node_table(free, part)
     assert "verdict" not in table.column_names
     assert table["residual"].null_count == np.count_nonzero(~part.deviation.observed)
+    assert "unresolved" not in table.column_names
+    flagged = node_table(free, replace(part, unresolved=np.ones(len(part.residual), dtype=bool)))["unresolved"]
+    assert np.array_equal(flagged.to_numpy(), part.deviation.observed)
     with pytest.raises(ValueError, match="no map"):
         node_table(record, record.parts[1])
 

@@ -128,7 +128,7 @@ class Correlate:
         systematic = self.systematic
         if systematic is not None:
             systematic = at_least(systematic, disagreement(seen, pictures.sharp, state.views, state.motion), seen)
-        sure = uncertainty(seen, found, state.views, state.weights, last, systematic)
+        sure = uncertainty(seen, found, state.views, state.weights, last, systematic, state.motion)
         local = float(np.sqrt(np.median(sure.system.motion.quadratic(seen.space.rows(seen)))))
         motions = hidden_motions(seen, sure.system, last, local)
         if last.poses != "known" and not seen.space.confined:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy import sparse
+from scipy.stats import chi2, norm
 
-from inspect3d.arrays import Floats, Integers
+from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
 from inspect3d.correlation.linear import noise_of, slides_of, system_of
@@ -18,12 +19,36 @@ from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.space import EVERY_NODE
 from inspect3d.correlation.system import System
 
-MISSED = 3.2  # standard uncertainties of the size of a bump that the motions of a solution cannot make
-WIDTHS = (1, 2, 4)  # steps of averaging over neighbours that make such bumps from a node
-RESTLESS, AROUND = 4.0, (1, 2)  # standard deviations of the mean square of facets; steps of averaging over neighbours
-INDEPENDENT = 0.2  # share of a bump's stiffness that the motions do not have, at the least
-DOUBTED = 2.5  # standard uncertainties of the mean over a node and its neighbours
-ALONE = 3.5  # standard uncertainties of a node by itself
+CHANCE = 0.01  # of noise making any node of a map stand out in one of the tests
+BESIDE = 2.5, 3.0, 3.2  # standard uncertainties that do so beside such a node: of means, facets and bumps
+ALONE = 3.5  # the same of a node by itself
+WIDTHS = (1, 2, 4)  # steps of averaging over neighbours that make bumps from a node
+AROUND = (1, 2)  # steps of averaging over neighbours, of the squares of facets
+INDEPENDENT = 0.2  # share of a bump's stiffness, or of a node's variance, that the motions do not have, at the least
+
+
+@dataclass(frozen=True, eq=False)
+class Test:
+    """What one test says about every node: is there more than noise, and how much.
+
+    Parameters
+    ----------
+    beyond : (n,), in standard uncertainties
+    beside : how much of that counts near nodes that stand out beyond doubt
+    squared : (n,) mm², of what is missed
+    over : (n, n), the nodes that a test belongs to, a row each
+    """
+
+    beyond: Floats
+    beside: float
+    squared: Floats
+    over: sparse.csr_matrix
+
+    def found(self, near: Booleans) -> Floats:
+        """Return the mean squared size (n,) mm² over the tests that stand out and that a node belongs to; 0: none."""
+        out = (near & (self.beyond > self.beside)).astype(np.float64)
+        number = self.over @ out
+        return np.divide(self.over @ (self.squared * out), number, out=np.zeros(len(out)), where=number > 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,30 +80,25 @@ class LackOfFit:
     alone: Floats
     precision: Floats
 
-    def size(self, within: System, rows: sparse.csr_matrix, times: float) -> Floats:
-        """Return the size (n,) mm of the error of the model where there is one beyond doubt, and around; 0 elsewhere.
+    def squared(
+        self, within: System, rows: sparse.csr_matrix, times: float, reach: Callable[[Booleans], Booleans]
+    ) -> Floats:
+        """Return the squared size (n,) mm² of the error of the model where there is one beyond doubt, and around.
+
+        Of as many nodes as a map has some stand out by chance. So much as noise hardly ever reaches in any of them
+        proves an error; as far as the same control points reach, less than that counts as well.
 
         Parameters
         ----------
         within : the system of the solution
         rows : (n, k), from its motions to those of the nodes
         times : by how much the variance of the residuals is larger there
+        reach : returns the nodes that move together with some
         """
-        near, around = self._near, self._around
-        own = sparse.identity(len(self.increment), format="csr")
-        mean = around @ self.increment
-        variance = times * self.system.variances(own) - within.variances(rows)
-        variance_of_mean = times * self.system.variances(around) - within.variances(around @ rows)
-        alone = self.increment**2 > ALONE**2 * variance
-        sizes = np.where(alone, np.maximum(self.increment**2 - variance, 0.0), 0.0)
-        doubted = near @ (alone | (mean**2 > DOUBTED**2 * variance_of_mean)).astype(np.float64) > 0
-        sizes = np.maximum(sizes, mean**2)
-        found = np.where(doubted, np.maximum(sizes, around @ sizes), 0.0)
-        for width in WIDTHS:
-            found = np.maximum(found, self._missed(within, rows, times, around**width))
-        for width in AROUND:
-            found = np.maximum(found, self._restless(times, around**width))
-        return np.sqrt(found)
+        tests = tuple(self._tests(within, rows, times))
+        proof = float(norm.isf(CHANCE / 2 / len(self.increment)))
+        near = reach(np.any([test.beyond > proof for test in tests], axis=0))
+        return np.max([test.found(near) for test in tests], axis=0)
 
     @property
     def sign(self) -> Floats:
@@ -95,16 +115,38 @@ class LackOfFit:
         return (sparse.diags(1 / np.sqrt(np.asarray(wide.power(2).sum(axis=1)).ravel())) @ wide).tocsr()
 
     @cached_property
-    def _near(self) -> sparse.csr_matrix:
+    def near(self) -> sparse.csr_matrix:
+        """Return a one for each node and its neighbours, (n, n)."""
         return self.scene.adjacency + sparse.identity(len(self.increment), format="csr")
 
     @cached_property
     def _around(self) -> sparse.csr_matrix:
         """Return averages over each node and its neighbours, (n, n)."""
-        return sparse.diags(1 / np.asarray(self._near.sum(axis=1)).ravel()) @ self._near
+        return sparse.diags(1 / np.asarray(self.near.sum(axis=1)).ravel()) @ self.near
 
-    def _missed(self, within: System, rows: sparse.csr_matrix, times: float, bumps: sparse.csr_matrix) -> Floats:
-        """Return squared sizes (n,) mm² of what the solution misses on average over bumps (n, n), a row each.
+    def _tests(self, within: System, rows: sparse.csr_matrix, times: float) -> Iterator[Test]:
+        """Yield tests of the nodes by themselves, of means over neighbours, of bumps and of facets."""
+        around = self._around
+        means, facets, bumps = BESIDE
+        yield self._moved(sparse.identity(len(self.increment), format="csr"), within, rows, times, ALONE)
+        yield self._moved(around, within, rows, times, means)
+        for width in WIDTHS:
+            yield self._missed(around**width, within, rows, times, bumps)
+        for width in AROUND:
+            yield self._restless(around**width, times, facets)
+
+    def _moved(
+        self, mean: sparse.csr_matrix, within: System, rows: sparse.csr_matrix, times: float, beside: float
+    ) -> Test:
+        """Return the test of means of the increment, (n, n), a row each."""
+        size, whole = mean @ self.increment, times * self.system.variances(mean)
+        variance = np.maximum(whole - within.variances((mean @ rows).tocsr()), INDEPENDENT * whole)
+        return Test(np.abs(size) / np.sqrt(variance), beside, np.maximum(size**2 - variance, 0.0), self._around)
+
+    def _missed(
+        self, bumps: sparse.csr_matrix, within: System, rows: sparse.csr_matrix, times: float, beside: float
+    ) -> Test:
+        """Return the test of what the solution misses on average over bumps (n, n), a row each.
 
         The increment's average over many nodes would need more of an inverse than its pattern. The scores s tell the
         same: a bump p has the score p's of the variance p'Kp, less what the motions of the solution take of it, and
@@ -114,27 +156,30 @@ class LackOfFit:
         stiff = np.asarray(bumps.T.multiply(pushed).sum(axis=0)).ravel()
         taken = (rows.T @ pushed).toarray()
         own = stiff - (taken * within.covariance(taken)).sum(axis=0)
-        scores = bumps @ self.scores
-        missed = (own > INDEPENDENT * stiff) & (scores**2 > MISSED**2 * times * own)
-        whole = bumps @ np.asarray(self.stiffness.sum(axis=1)).ravel()
-        sizes = np.where(missed, np.divide(scores, whole, out=np.zeros(len(whole)), where=whole > 0) ** 2, 0.0)
-        near = bumps @ missed.astype(np.float64)
-        return np.divide(bumps @ sizes, near, out=np.zeros(len(near)), where=near > 0)
+        scores, whole = bumps @ self.scores, bumps @ np.asarray(self.stiffness.sum(axis=1)).ravel()
+        apart = (own > INDEPENDENT * stiff) & (whole > 0)
+        beyond = np.divide(np.abs(scores), np.sqrt(times * np.where(apart, own, 1.0)), out=np.zeros(len(whole)))
+        size = np.divide(scores, whole, out=np.zeros(len(whole)), where=apart)
+        return Test(np.where(apart, beyond, 0.0), beside, size**2, bumps)
 
-    def _restless(self, times: float, near: sparse.csr_matrix) -> Floats:
-        """Return squared sizes (n,) mm² of what facets move by more than noise where they do not agree, as at a step.
+    def _restless(self, mean: sparse.csr_matrix, times: float, beside: float) -> Test:
+        """Return the test of what facets move by more than noise where they do not agree, as at a step.
 
         Up on one side and down on the other, such motions cancel in averages. Their squares, in standard uncertainties,
         have the mean one and the variance two.
         """
         corners, every = self.scene.triangles, np.repeat(np.arange(len(self.alone)), 3)
-        of = sparse.csr_matrix((np.ones(corners.size), (corners.ravel(), every)), (near.shape[0], len(self.alone)))
-        counts = near @ of @ sparse.diags((self.precision > 0).astype(np.float64))
-        number = np.asarray(counts.sum(axis=1)).ravel()
-        noise = np.sqrt(2 * np.asarray(counts.power(2).sum(axis=1)).ravel())
-        excess = counts @ (self.precision * self.alone**2 / times) - number
-        sizes = np.divide(excess, counts @ (self.precision / times), out=np.zeros(len(excess)), where=number > 0)
-        return np.where(excess > RESTLESS * noise, sizes, 0.0)
+        of = sparse.csr_matrix((np.ones(corners.size), (corners.ravel(), every)), (mean.shape[0], len(self.alone)))
+        counts = mean @ of @ sparse.diags((self.precision > 0).astype(np.float64))
+        number, known = np.asarray(counts.sum(axis=1)).ravel(), counts @ (self.precision / times)
+        shown = number > 0
+        squares = counts @ (self.precision * self.alone**2 / times)
+        share = np.divide(
+            number, np.asarray(counts.power(2).sum(axis=1)).ravel(), out=np.ones(len(number)), where=shown
+        )
+        beyond = norm.isf(chi2.sf(squares * share, np.maximum(number * share, 1.0)))
+        squared = np.divide(np.maximum(squares - number, 0.0), known, out=np.zeros(len(number)), where=shown)
+        return Test(np.where(shown, beyond, 0.0), beside, squared, self._around)
 
 
 def lack_of_fit(
@@ -153,11 +198,7 @@ def lack_of_fit(
     system = system_of(free, found, factors, noise, freedom, columns, scale, slides)
     scores = scene.gathered(found.right * (weights * found.clean / noise)[:, None])
     increment, cameras = system.solve(scores, np.zeros(freedom.unknowns))
-    corners = increment[scene.triangles]
-    moved = np.einsum("fij,fj->fi", found.node, corners) + found.cross @ (freedom.spread(columns)[0] @ cameras)
-    statistics = found.statistics.copy()
-    statistics[:, 0] += ((moved - 2 * found.right) * corners).sum(axis=1)
-    left = replace(found, right=found.right - found.clean[:, None] * moved, statistics=statistics)
+    left = found.after(increment[scene.triangles], freedom.spread(columns)[0] @ cameras)
     before, noise = noise, noise_of(left, weights, unknowns)
     system = system_of(free, found, factors, noise, freedom, columns, scale, slides)
     stiffness = scene.matrix(scene.assembled(found.node * (factors / noise)[:, None, None]))

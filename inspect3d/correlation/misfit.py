@@ -28,10 +28,12 @@ class Misfit:
     correlated : κ >= 1, squared scores J'W r of the facets over what they would be for independent residuals, where the
         elements fit
     fitted : (f,), whether the elements fit there
+    doubted : (n,), nodes around which noise would seldom add up to as much
     """
 
     correlated: float
     fitted: Booleans
+    doubted: Booleans
 
 
 def misfit(scene: Scene, found: Facets, weights: Floats, system: System, mixing: Floats) -> Misfit:
@@ -49,7 +51,7 @@ def misfit(scene: Scene, found: Facets, weights: Floats, system: System, mixing:
     squares, expected, spread = _scores(scene, found, weights, system, mixing)
     counted = expected > 0
     if not counted.any():
-        return Misfit(1.0, np.ones(len(weights), dtype=bool))
+        return Misfit(1.0, np.ones(len(weights), dtype=bool), np.zeros(len(scene.nodes), dtype=bool))
     corners, n = scene.triangles.ravel(), len(scene.nodes)
     sums = [np.bincount(corners, np.repeat(values, 3), minlength=n) for values in (squares, expected, spread)]
     known = sums[2] > 0
@@ -63,7 +65,7 @@ def misfit(scene: Scene, found: Facets, weights: Floats, system: System, mixing:
         before, usual = usual, max(1.0, float(squares[fitted].sum() / expected[fitted].sum()))
         if usual == before:
             break
-    return Misfit(usual, worst <= usual)
+    return Misfit(usual, worst <= usual, chi2.sf(ratio * degrees / usual, degrees) < SELDOM)
 
 
 def unresolved(scene: Scene, found: Facets, noise: float, fitted: Booleans) -> Floats:

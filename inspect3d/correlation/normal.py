@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -58,6 +58,13 @@ class Facets:
     def noise(self) -> Floats:
         """Return the mean squared residual per degree of freedom, (f,) grey levels²; infinite without contrast."""
         return np.divide(self.energy, self.freedom, out=np.full(len(self.energy), np.inf), where=self.freedom > 0)
+
+    def after(self, corners: Floats, cameras: Floats) -> Facets:
+        """Return what is left, to first order, when the corners have moved by (f, 3) mm and the cameras by (C,)."""
+        moved = np.einsum("fij,fj->fi", self.node, corners) + self.cross @ cameras
+        statistics = self.statistics.copy()
+        statistics[:, 0] += ((moved - 2 * self.right) * corners).sum(axis=1)
+        return replace(self, right=self.right - self.clean[:, None] * moved, statistics=statistics)
 
 
 def facets(

@@ -85,6 +85,16 @@ class Shape:
         residual[scene.node] = np.sqrt(np.clip(1 - sums / weights, 0, 2) / 2)
         return residual
 
+    @property
+    def unresolved(self) -> Booleans | None:
+        """Tell at which observed nodes of the mesh splines do not follow the part; None where none move it."""
+        model = self.uncertainty.model
+        if model is None:
+            return None
+        unresolved = np.zeros(len(self.mesh), dtype=bool)
+        unresolved[self.scene.node[self.sound & model.missed]] = True
+        return unresolved
+
     @cached_property
     def gauge(self) -> Gauge:
         """Return the common alignment, the robust best fit over the observed nodes."""

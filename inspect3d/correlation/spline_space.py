@@ -39,6 +39,7 @@ class SplineSpace:
     patches : the nominal surfaces, their control points numbered one patch after the other
     ways : in which each control point moves, see `Nurbs.along`
     free : Z (c, k), orthonormal columns; none: q = p
+    apart : the same where neighbouring faces do not keep together; none: they do not here
     """
 
     nodes: sparse.csr_matrix
@@ -46,6 +47,7 @@ class SplineSpace:
     patches: tuple[Nurbs, ...]
     ways: int = 1
     free: Floats | None = None
+    apart: SplineSpace | None = None
 
     @property
     def confined(self) -> bool:
@@ -127,7 +129,19 @@ class SplineSpace:
 
     def restricted(self, node: Integers, kept: Booleans) -> SplineSpace:
         """Return the space of all functions over some of the nodes and facets."""
-        return replace(self, nodes=self.nodes[node], samples=self.samples[np.repeat(kept, len(_shapes()))])
+        apart = None if self.apart is None else self.apart.restricted(node, kept)
+        return replace(self, nodes=self.nodes[node], samples=self.samples[np.repeat(kept, len(_shapes()))], apart=apart)
+
+    def sharing(self, some: Booleans) -> Booleans:
+        """Tell which nodes (n,) have a control point in common with some of them (n,)."""
+        moved = self.nodes != 0
+        return np.asarray(moved @ (moved.T @ some.astype(np.float64)) > 0)
+
+    @cached_property
+    def patch(self) -> Integers:
+        """Return the number of the patch that moves each node, (n,)."""
+        ends = np.cumsum([self.ways * patch.size for patch in self.patches])
+        return np.searchsorted(ends, self.nodes.indices[self.nodes.indptr[:-1]], side="right")
 
     def _spread(self, motions: Floats) -> Floats:
         """Return the motions of the control points, Z q."""

@@ -74,7 +74,8 @@ class Splines:
             free = telling(space.nodes, self.ways)
             space, rows = space.within(free), rows @ free
         if len(rows):
-            space = space.within(kept_together(rows, shifts, space.rows(apart), apart))
+            joined = space.within(kept_together(rows, shifts, space.rows(apart), apart))
+            space = replace(joined, apart=space)
         return replace(apart, space=space)
 
     def _patches(self, brep: Brep, seen: Scene, face: Integers) -> dict[int, Nurbs]:

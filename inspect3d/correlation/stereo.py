@@ -165,6 +165,7 @@ class Stereo:
             symmetric=begin.symmetric,
             views=shape.views,
             residual=shape.residual,
+            unresolved=shape.unresolved,
             hidden=tuple(motion.words for motion in shape.hidden),
             weak=np.array([motion.pattern for motion in shape.hidden if motion.pattern.any()]).reshape(-1, nodes).T,
             contributions=contributions(shape),

@@ -15,6 +15,7 @@ from inspect3d.correlation.freedom import Freedom
 from inspect3d.correlation.lack_of_fit import lack_of_fit
 from inspect3d.correlation.linear import noise_of, slides_of, system_of
 from inspect3d.correlation.misfit import misfit, unresolved
+from inspect3d.correlation.model_error import ModelError, model_error
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.smoothing import Smoothing
@@ -40,7 +41,7 @@ class Systematic:
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """The covariance T (C + F F') T' + m m' ∘ A A' of the reported deviation of the scene's nodes, in mm².
+    """The covariance T (C + F F') T' + diag(m²) of the reported deviation of the scene's nodes, in mm².
 
     Where the map is smoothed the motions are S q, see `Smoothing`; C and F are S C S' and S F then.
 
@@ -49,13 +50,11 @@ class Uncertainty:
     system : the information of the pictures and priors; its inverse is C
     shifts : F (k, r), the response of the shape to the systematic field
     smoother : T (n, k), from the motions of the scene's space to the deviation of its nodes
-    rough : m (n,) mm, of nodes where the elements do not fit, as at a step, or splines miss the part; 0 elsewhere. Of a
-        smoothed map the bias too
+    rough : m (n,) mm, of nodes where the elements do not fit, as at a step; 0 elsewhere. Of a smoothed map the bias too
     noise : variance of the residuals where they fit, grey levels²
     correlated : κ >= 1, by which the residuals of neighbouring points add up to more than if they were independent
     smoothing : S, of a map that is smoothed
-    alike : rows A (n, n) of length one; A A' is how far the errors m of two nodes, with their signs, go together. None:
-        not at all
+    model : what splines miss of the part, added to the covariance; None: nodes move by themselves
     """
 
     system: System
@@ -65,7 +64,7 @@ class Uncertainty:
     noise: float
     correlated: float
     smoothing: Smoothing | None = None
-    alike: sparse.csr_matrix | None = None
+    model: ModelError | None = None
 
     def deviation(self, motion: Floats) -> Floats:
         """Return the deviation (n,) mm to be reported of a motion (k,)."""
@@ -89,15 +88,15 @@ class Uncertainty:
     def variances(self) -> Floats:
         """Return the diagonal, (n,) mm²."""
         by_shifts = ((self.smoother @ self.shifts) ** 2).sum(axis=1)
-        return self._motions.variances(self.smoother) + by_shifts + self.rough**2
+        missed = 0.0 if self.model is None else self.model.variances
+        return self._motions.variances(self.smoother) + by_shifts + self.rough**2 + missed
 
     def covariance(self, columns: Floats) -> Floats:
         """Return the covariance times columns (n, k)."""
         back = self.smoother.T @ columns
         smooth = self.smoother @ (self._motions.covariance(back) + self.shifts @ (self.shifts.T @ back))
-        rough = self.rough[:, None] * columns
-        shared = rough if self.alike is None else self.alike @ (self.alike.T @ rough)
-        return smooth + self.rough[:, None] * shared
+        missed = 0.0 if self.model is None else self.model.covariance(columns)
+        return smooth + self.rough[:, None] ** 2 * columns + missed
 
     def variances_without(self, modes: Floats, solver: Floats) -> Floats:
         """Return the diagonal for the field less its modes, (I - J M) v: J = `modes` (n, k) and M = `solver` (k, n)."""
@@ -122,6 +121,7 @@ def uncertainty(
     weights: Floats,
     freedom: Freedom,
     systematic: Systematic | None,
+    motion: Floats,
 ) -> Uncertainty:
     """Return how sure a solution is.
 
@@ -136,6 +136,7 @@ def uncertainty(
         facet's camera block where there is a systematic field
     weights : (f,) of the facets
     systematic : the field to propagate; its response is that of the estimate to a shift of picture k, H₀⁻¹ J'W h_k
+    motion : (k,) mm, the solution
     """
     columns = needed_columns(freedom, systematic)
     rows, mixing = scene.space.rows(scene), freedom.spread(columns)[0]
@@ -153,15 +154,17 @@ def uncertainty(
     noise = noise_of(left, weights * summed.fitted, round(unknowns * summed.fitted.mean()))
     total = noise * summed.correlated
     system = system_of(scene, found, factors, total, freedom, columns, scale, slides)
-    rough, alike = unresolved(scene, left, total, summed.fitted), None
+    rough, model = np.zeros(len(scene.nodes)), None
     if scene.space.confined:
-        rough, alike = lack.sign * np.hypot(rough, lack.size(system, rows, total / before)), lack.alike
+        model = model_error(scene, found, views, weights, freedom, columns, lack, summed, system, total, motion)
+    else:
+        rough = unresolved(scene, left, total, summed.fitted)
     shifts = np.zeros((len(system.cross), 0))
     if systematic is not None:
         shares = weights * found.clean / total
         shifts = _shifts(scene, found, shares, system, mixing, columns, systematic)
     smoother = scene.space.smoother(scene, weights)
-    return Uncertainty(system, shifts, smoother, rough, noise, summed.correlated, alike=alike)
+    return Uncertainty(system, shifts, smoother, rough, noise, summed.correlated, model=model)
 
 
 def _shifts(

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from inspect3d.correlation.freedom import Freedom
+from inspect3d.correlation.model_error import ModelError
 from inspect3d.correlation.shape import Shape
 
 LOUD = 0.1  # px, disagreement of the pictures that the reader must hear of
@@ -31,6 +32,11 @@ def contributions(shape: Shape) -> tuple[tuple[str, str, str], ...]:
         size = 1000 * float(np.sqrt(sum(motion.sigma**2 for motion in weak)))
         words = "motions that the pictures tell weakly, which the priors of the cameras bound; named below"
         found.append(("cameras", f"{size:.2g} µm rms over the map", words))
+    if sure.model is not None and sure.model.missed[shape.sound].any():
+        missed = shape.sound & sure.model.missed
+        size = 1000 * float(np.sqrt(np.mean(sure.model.variances[missed])))
+        words = "shape that the control points do not follow, such as steps; at the nodes flagged as unresolved"
+        found.append(("splines", f"{size:.2g} µm rms there", words))
     if sure.smoothing is not None:
         words = "what smoothing took off the map, counted at each node as far as it may be shape"
         found.append(("smoothing", f"{1000 * _taken(shape):.2g} µm rms over the map", words))
@@ -55,6 +61,25 @@ def _pulled(shape: Shape, freedom: Freedom) -> tuple[str, ...]:
     )
 
 
+def _unresolved(shape: Shape, model: ModelError) -> list[str]:
+    """Return where splines do not follow the part, and what to do."""
+    flagged, observed = np.count_nonzero(shape.sound & model.missed), np.count_nonzero(shape.sound)
+    found = []
+    if flagged:
+        found.append(
+            f"At {flagged} of the {observed} observed nodes the pictures show shape that the control points do not "
+            "follow, such as a step or a narrow bump: the map is smeared there. By how much, as far as the pictures "
+            "tell, is in the uncertainty, and the nodes are flagged as unresolved. To see such shape choose a higher "
+            '`refine` or method = "stereocorrelation".'
+        )
+    if model.parted:
+        found.append(
+            "Neighbouring faces do not meet as the CAD has it: the pictures show steps along their edges, where "
+            "`continuity` keeps them together. With continuity = 0 each face moves by itself."
+        )
+    return found
+
+
 def remarks(shape: Shape, freedom: Freedom) -> tuple[str, ...]:
     """Return what the reader must know about a shape, a sentence each.
 
@@ -75,6 +100,8 @@ def remarks(shape: Shape, freedom: Freedom) -> tuple[str, ...]:
             f"{shape.systematic.size:.2g} px: the calibration is not as good as it is said to be. State its "
             "uncertainty (`sigma`), or calibrate again."
         )
+    if shape.uncertainty.model is not None:
+        remarks += _unresolved(shape, shape.uncertainty.model)
     if not shape.settled:
         remarks.append(
             f"The solver stopped after {len(shape.state.steps)} steps of its last stage, before the shape had settled: "

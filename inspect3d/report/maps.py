@@ -19,7 +19,8 @@ def map_polydata(mesh: InspectionMesh, part: MeasuredPart) -> PolyData:
 
     `deviation` and `sigma` are float64 in mm and NaN where the node is not observed; `observed` and `crease` are
     uint8; `verdict` is int8: 0 none, 1 conform, 2 undecided, 3 nonconform; `Normals` are the outward normals.
-    Stereo methods add `residual`, float64 and NaN where no facet around the node was measured.
+    Stereo methods add `residual`, float64 and NaN where no facet around the node was measured; isogeometric ones
+    `unresolved`, uint8: 1 where the part has a shape that their splines do not follow.
 
     Raises
     ------
@@ -40,6 +41,8 @@ def map_polydata(mesh: InspectionMesh, part: MeasuredPart) -> PolyData:
     polydata.point_data["verdict"] = verdict.astype(np.int8)
     if part.residual is not None:
         polydata.point_data["residual"] = np.array(part.residual)
+    if part.unresolved is not None:
+        polydata.point_data["unresolved"] = (observed & part.unresolved).astype(np.uint8)
     polydata.point_data.active_normals = np.array(mesh.normals)
     return polydata
 

@@ -100,6 +100,7 @@ def _measurement(record: Record, mesh: InspectionMesh, part: MeasuredPart) -> di
         "noise": part.noise,
         "regions": [_region(region) for region in part.regions],
         "features": [_feature(feature) for feature in part.features],
+        "unresolved": _unresolved(mesh, part) if has_map else None,
         "sensitivity": _sensitivity(part.sensitivity) if part.sensitivity else None,
         "hidden": list(part.hidden),
         "contributions": [list(each) for each in part.contributions],
@@ -190,6 +191,17 @@ def _deviation(mesh: InspectionMesh, part: MeasuredPart) -> dict[str, Any] | Non
         | {"sigma_p50": float(median), "sigma_p95": float(high)}
         | {"observed_area": float(areas.sum() / mesh.areas.sum())}
     )
+
+
+def _unresolved(mesh: InspectionMesh, part: MeasuredPart) -> dict[str, Any] | None:
+    """Return where the method does not follow the shape of the part; None where it does not look for that."""
+    if part.deviation is None or part.unresolved is None:
+        return None
+    observed = part.deviation.observed
+    flagged = observed & part.unresolved
+    area = mesh.areas[observed].sum()
+    share = float(mesh.areas[flagged].sum() / area) if area > 0 else None
+    return {"nodes": int(flagged.sum()), "share_of_observed_area": share}
 
 
 def _comparison(comparison: Comparison) -> dict[str, Any]:

@@ -22,7 +22,7 @@ def node_table(record: Record, part: MeasuredPart) -> Table:
     `node` counts from 0; `x`, `y`, `z` (mm) and `normal_x`, `normal_y`, `normal_z` are the node and its outward normal
     in the CAD frame; `area` (mm²) is what it stands for; `deviation` and `sigma` (mm, k = 1) are null where nothing was
     measured; `observed` and `crease` are flags; `lower` and `upper` (mm) its tolerance, and `verdict` a word, where
-    there is a tolerance; `residual` where the method has one.
+    there is a tolerance; `residual` and `unresolved` where the method has them.
 
     Raises
     ------
@@ -49,6 +49,8 @@ def node_table(record: Record, part: MeasuredPart) -> Table:
         columns["verdict"] = pyarrow.DictionaryArray.from_arrays(verdict, list(VERDICTS))
     if part.residual is not None:
         columns["residual"] = pyarrow.array(part.residual, from_pandas=True)
+    if part.unresolved is not None:
+        columns["unresolved"] = pyarrow.array(part.deviation.observed & part.unresolved)
     notes = {"part": record.recipe.part.name, "measurement": part.name, "method": part.provenance, "units": "mm"}
     return pyarrow.table(columns, metadata=notes)
 

@@ -1,0 +1,116 @@
+"""What the splines of a model miss of a part: how large it is at every node, and which nodes it concerns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from inspect3d.arrays import Booleans, Floats, Integers
+from inspect3d.camera import View
+from inspect3d.correlation.freedom import Freedom
+from inspect3d.correlation.lack_of_fit import LackOfFit, lack_of_fit
+from inspect3d.correlation.misfit import Misfit, unresolved
+from inspect3d.correlation.normal import Facets
+from inspect3d.correlation.parting import parting
+from inspect3d.correlation.scene import Scene
+from inspect3d.correlation.spline_space import SplineSpace
+from inspect3d.correlation.system import System
+
+MOST = 0.5  # share of the nodes of a face that are missed, from which on all of them are
+
+
+@dataclass(frozen=True, eq=False)
+class ModelError:
+    """An error m m' ∘ A A' + g g' of the model, mm², and where it is.
+
+    Parameters
+    ----------
+    rough : m (n,) mm, with the sign of what is missed
+    gap : g (n,) mm, by which faces that were kept together have come apart
+    alike : A (n, n), rows of length one; see `LackOfFit.alike`
+    missed : (n,), nodes around which splines do not follow the part
+    """
+
+    rough: Floats
+    gap: Floats
+    alike: sparse.csr_matrix
+    missed: Booleans
+
+    @property
+    def parted(self) -> bool:
+        """Tell whether faces that were kept together have come apart."""
+        return bool(self.gap.any())
+
+    @property
+    def variances(self) -> Floats:
+        """Return the diagonal, (n,) mm²."""
+        return self.rough**2 + self.gap**2
+
+    def covariance(self, columns: Floats) -> Floats:
+        """Return it times columns (n, k)."""
+        rough = self.rough[:, None] * columns
+        return self.rough[:, None] * (self.alike @ (self.alike.T @ rough)) + np.outer(self.gap, self.gap @ columns)
+
+
+def model_error(
+    scene: Scene,
+    found: Facets,
+    views: Sequence[View],
+    weights: Floats,
+    freedom: Freedom,
+    columns: Integers,
+    lack: LackOfFit,
+    summed: Misfit,
+    system: System,
+    noise: float,
+    motion: Floats,
+) -> ModelError:
+    """Return what splines miss of a part.
+
+    Where faces have come apart beyond doubt, that is one error of known size, and what else is missed is looked for
+    beyond it. Where facets do not fit whatever their nodes do, as on a step, the map cannot tell which side of it a
+    node is on: what is missed is as large as the map is uneven over the node and its neighbours.
+
+    Parameters
+    ----------
+    found : what the pictures say about the facets at the solution, by `columns` and in the power 2
+    weights : (f,) of the facets
+    lack, summed : of the nodes by themselves
+    system : of the solution
+    noise : variance of the residuals, correlated as they are, grey levels²
+    motion : (k,) mm, the solution
+    """
+    space = scene.space
+    assert isinstance(space, SplineSpace)
+    within, rows, times = system, space.rows(scene), noise / lack.noise
+    gaps = np.zeros(len(scene.nodes))
+    plain, sign = system.variances(rows), np.ones(len(scene.nodes))
+    parted = parting(scene, found, views, weights, freedom, columns, noise)
+    if parted is not None:
+        gaps, sign = parted.squared(plain), np.sign(parted.motion)
+        lack = lack_of_fit(scene, parted.left, views, weights, freedom, columns)
+        within, rows = parted.system, parted.rows
+    strained = unresolved(scene, lack.left, noise, summed.fitted) ** 2
+    squared = np.maximum(lack.squared(within, rows, times, space.sharing), strained)
+    missed = _around(lack, (squared > 0) | (gaps > plain))
+    uneven = _around(lack, missed & summed.doubted)
+    squared = np.maximum(squared, np.where(uneven, _spread(lack, space.rows(scene) @ motion), 0.0))
+    missed |= uneven
+    patch = space.patch
+    share = np.bincount(patch, missed) / np.maximum(np.bincount(patch), 1)
+    rough = lack.sign * np.sqrt(np.maximum(squared - gaps, 0.0))
+    return ModelError(rough, sign * np.sqrt(gaps), lack.alike, missed | (share > MOST)[patch])
+
+
+def _around(lack: LackOfFit, some: Booleans) -> Booleans:
+    """Tell which nodes are some, or neighbours of them."""
+    return np.asarray(lack.near @ some.astype(np.float64) > 0)
+
+
+def _spread(lack: LackOfFit, deviation: Floats) -> Floats:
+    """Return the variance (n,) of a deviation over each node and its neighbours."""
+    number = np.asarray(lack.near.sum(axis=1)).ravel()
+    return np.maximum(lack.near @ deviation**2 / number - (lack.near @ deviation / number) ** 2, 0.0)
