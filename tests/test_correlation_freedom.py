@@ -10,6 +10,7 @@ from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.hidden import hidden_motions
 from inspect3d.correlation.linear import gauge_of, slides_of, system_of
+from inspect3d.correlation.normal import facets
 from inspect3d.correlation.picture import Pictures
 from inspect3d.correlation.scene import scene
 from inspect3d.correlation.still import in_gauge, stilled
@@ -27,6 +28,23 @@ def flat():
 @pytest.fixture(scope="module")
 def wavy():
     return wavy_sheet()
+
+
+def test_the_pictures_resist_turns_about_the_origin_of_the_freedom_wherever_that_is(wavy):
+    _, views, seen, stack = wavy
+    origin = seen.centre + np.array([20.0, -30.0, 40.0])  # a part of which one corner is seen
+    freedom = Freedom("free", (Lens(),) * 2, tuple(views), origin)
+    mixing, _ = freedom.spread(freedom.columns)
+    flat, even = np.zeros(len(seen.nodes)), np.ones(len(seen.triangles))
+    off = freedom.moved(views, 0.3 * freedom.scale(views, seen.sample) * np.array([0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0]))
+    found = facets(seen, stack, off, flat, even, freedom.columns, power=0, origin=origin)
+    weights = found.energy / (1 - found.correlation)
+    for step in np.diag(0.01 * freedom.scale(views, seen.sample)):
+        here = [freedom.moved(off, k * step) for k in (1, -1)]
+        ahead, back = (
+            weights @ (1 - accumulated(seen, stack, each, columns=freedom.columns).correlation) for each in here
+        )
+        assert -(mixing.T @ found.camera_right) @ step == pytest.approx((ahead - back) / 4, rel=0.05, abs=1.0)
 
 
 def test_two_free_projection_matrices_hide_fifteen_motions_that_priors_name():

@@ -146,7 +146,17 @@ class Correlate:
     def _found(self, seen: Scene, pictures: Pictures, state: State, freedom: Freedom) -> Facets:
         """Return what the pictures say about the facets in the end, as `uncertainty` needs it."""
         columns, whole = needed_columns(freedom, self.systematic), self.systematic is not None
-        return facets(seen, pictures.sharp, state.views, state.motion, state.weights, columns, power=2, whole=whole)
+        return facets(
+            seen,
+            pictures.sharp,
+            state.views,
+            state.motion,
+            state.weights,
+            columns,
+            power=2,
+            whole=whole,
+            origin=freedom.origin,
+        )
 
     def _good(self, seen: Scene, found: Facets) -> Booleans:
         """Tell which facets agree between the pictures, (f,).

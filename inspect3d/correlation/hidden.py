@@ -90,7 +90,7 @@ def _unseen(scene: Scene, system: System, freedom: Freedom) -> list[HiddenMotion
     basis = np.linalg.qr(together[as_one].T)[0].T
     motions = basis / np.array([length] * 3 + [1.0] * 3)
     flat = np.zeros(len(scene.nodes))
-    words = [f"{motion.words}: the surface stays in itself" for motion in named(motions, scene.centre, length)]
+    words = [f"{motion.words}: the surface stays in itself" for motion in named(motions, freedom.origin, length)]
     found = [HiddenMotion(w, flat, np.inf, 0.0) for w in words]
     apart_words = "a change of the cameras against each other that the pictures do not show"
     for pattern in (scene.space.rows(scene) @ system.following @ unseen[~as_one].T).T:

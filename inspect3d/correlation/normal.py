@@ -77,6 +77,7 @@ def facets(
     power: int = 1,
     whole: bool = False,
     points: EvaluationPoints | None = None,
+    origin: Floats | None = None,
 ) -> Facets:
     """Return what the pictures say about every facet.
 
@@ -89,6 +90,7 @@ def facets(
         the curvature without gradient noise H₀; 2, the information H₀ A⁻¹ H₀ of an estimate that has noisy slopes
     whole : keep each facet's camera block
     points : to compare at, some of the scene's; none: all of them
+    origin : (3,) mm, about which the cameras' parameters turn the part, that of the `Freedom`; none: the scene's centre
     """
     from inspect3d.correlation.facet_kernel import CHUNKS, accumulate
 
@@ -98,7 +100,7 @@ def facets(
         np.stack([view.camera.distortion for view in views]),
         np.stack([view.camera_from_cad.rotation for view in views]),
         np.stack([view.camera_from_cad.translation for view in views]),
-        np.asarray(scene.centre),
+        np.asarray(scene.centre if origin is None else origin),
     )
     points = scene.space.bent(scene, points or scene.points, motion)
     out = (

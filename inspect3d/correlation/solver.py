@@ -11,6 +11,7 @@ from scipy import sparse
 
 from inspect3d.arrays import Floats
 from inspect3d.camera import View
+from inspect3d.correlation.bounded_step import bounded_step
 from inspect3d.correlation.conjugate import conjugate
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.linear import noise_of, robust, slides_of, system_of
@@ -28,7 +29,7 @@ COARSE = 5e-4  # mm
 FINE_FEW, COARSE_FEW = 1e-4, 3e-3  # mm, for unknowns fewer than the nodes, whose steps shrink many times each
 SETTLED = 0.005  # share of what the cameras leave open about the shape: a shorter step changes nothing of note
 RUNAWAY = 0.3  # of the extent of what is seen: a step that large leads nowhere
-VAGUE = 1e-6  # share of the stiffest motion's stiffness; softer ones are held while the shape is
+FARTHEST = 1.0  # px, or the blur: a step of the cameras before a shape that is held moves the pictures no farther
 Moves = Literal["poses", "cameras", "shape", "both"]
 ON_NOMINAL = ("poses", "cameras")
 
@@ -158,7 +159,16 @@ class Solver:
         similar: Factored | None = None
         before: _Stride | None = None
         for count in range(level.steps):
-            found = facets(scene, stack, state.views, state.motion, state.weights, freedom.columns, points=points)
+            found = facets(
+                scene,
+                stack,
+                state.views,
+                state.motion,
+                state.weights,
+                freedom.columns,
+                points=points,
+                origin=freedom.origin,
+            )
             if not np.isfinite(found.noise).any():
                 raise MeasurementError(
                     "The pictures show no grey levels that vary where the part should be: check that they are of this "
@@ -236,8 +246,10 @@ def _step(
     if level.moves in ON_NOMINAL:
         matrix = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)
         firm = np.linalg.svd(slides / scale[:, None])[0][:, slides.shape[1] :] * scale[:, None]
-        inverse = firm @ np.linalg.pinv(firm.T @ matrix @ firm, VAGUE, hermitian=True) @ firm.T
-        return np.zeros(len(state.motion)), inverse @ camera_right, 0.0
+        cameras = bounded_step(
+            scene, state.views, freedom, firm, firm.T @ matrix @ firm, camera_right, max(level.blur, FARTHEST)
+        )
+        return np.zeros(len(state.motion)), cameras, 0.0
     factors = state.weights * found.clean
     system = system_of(scene, found, factors, noise, freedom, freedom.columns, scale, slides, level.stiffness)
     shape, cameras = system.solve(_equations(scene, found, noise, state, level)[1], camera_right)
