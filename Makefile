@@ -11,7 +11,7 @@ demo: $(READY)
 	@$(BIN)/inspect3d demo --out out/demo
 
 test: $(READY)
-	@$(BIN)/python -m pytest -n auto --maxprocesses 4
+	@$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal
 
 lint: $(READY)
 	@$(BIN)/ruff check

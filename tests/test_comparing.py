@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,37 +15,27 @@ from inspect3d.inspection import inspect, run
 from inspect3d.outcome import InputError
 from inspect3d.progress import Progress
 from inspect3d.recipe import load_recipe
-from inspect3d.virtual.bracket import bracket
-from inspect3d.virtual.deviation_field import Wave
-from inspect3d.virtual.uniform_scan import uniform_scan
+from tests.notched import recipe_text, write_notched
 from tests.test_compare_regions import Neighbourly
 
-BRACKET = Path(__file__).parents[1] / "datasets" / "bracket"
-FORM = Wave(0.02, (0.010, 0.013, 0.005), 1.0)
 
-
-def recipe(folder, scans, size=6.0):
-    """Write a recipe for scans of the bracket, by name and file, and return its path."""
+def recipe(folder, scans):
+    """Write a recipe for scans of the block, by name and file, and return its path."""
     start = 'alignment = { start = "identity" }'
     tables = "".join(
         f'[[measurements]]\nname = "{name}"\nmethod = "scan"\nfiles = ["{file}"]\n{start}\n'
         for name, file in scans.items()
     )
-    cad = json.dumps(str(BRACKET / "part.step"))
-    head = f'schema = 1\n[part]\nname = "Bracket"\ncad = {cad}\nelement_size = {size}\ntolerance = [-0.05, 0.05]\n'
-    path = folder / f"{'-'.join(scans)}-{size:g}.toml"
-    path.write_text(head + tables, encoding="utf-8")
+    path = folder / f"{'-'.join(scans)}.toml"
+    path.write_text(recipe_text(folder / "part.step", "tolerance = [-0.05, 0.05]", tables), encoding="utf-8")
     return path
 
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    """Two scans of one bracket: inspected together, and each by itself."""
+    """Two scans of one block: inspected together, and each by itself."""
     folder = tmp_path_factory.mktemp("runs")
-    surface = bracket().surface()
-    for seed, name in enumerate(("first.txt", "second.txt")):
-        scan = uniform_scan(surface, FORM, 3.0, 0.02, seed)
-        np.savetxt(folder / name, scan.points_scan, fmt="%.5f")
+    write_notched(folder, ("first.txt", "second.txt"))
     together = inspect(load_recipe(recipe(folder, {"a": "first.txt", "b": "second.txt"})), Progress())
     for name, file in (("a", "first.txt"), ("b", "second.txt")):
         run(recipe(folder, {name: file}), folder / f"only-{name}")

@@ -11,32 +11,31 @@ import pytest
 
 from inspect3d.inspection import check, inspect, run
 from inspect3d.outcome import InputError, Status
+from inspect3d.pose import Pose
 from inspect3d.progress import Progress
 from inspect3d.recipe import load_recipe
 from inspect3d.register.gauge import best_fit
 from inspect3d.virtual.truth import Truth
+from tests.notched import recipe_text, write_notched
 
 ROOT = Path(__file__).parents[1]
 BRACKET = ROOT / "datasets" / "bracket"
 CHECKER = ROOT.parent / "shared" / "tools" / "check_contract.py"
 
 
-def recipe(folder, part="", measurement="", rest=""):
-    """Write a recipe for the bracket and return its path."""
-    text = f"""
-schema = 1
-[part]
-name = "Bracket"
-cad = {json.dumps(str(BRACKET / "part.step"))}
-element_size = 4.0
-{part}
-[[measurements]]
-name = "laser"
-method = "scan"
-{measurement or "files = [" + json.dumps(str(BRACKET / "scan.ply")) + "]"}
-{rest}
-"""
-    (folder / "recipe.toml").write_text(text, encoding="utf-8")
+@pytest.fixture(scope="module")
+def block(tmp_path_factory):
+    """Return a folder with a block, part.step, and a scan of it in its place, scan.txt."""
+    folder = tmp_path_factory.mktemp("block")
+    write_notched(folder)
+    return folder
+
+
+def recipe(folder, block, part="", measurement="", rest=""):
+    """Write a recipe for the block and return its path; the scan starts where it is, unless `measurement` says else."""
+    known = f'files = [{json.dumps(str(block / "scan.txt"))}]\nalignment = {{ start = "identity" }}'
+    table = f'[[measurements]]\nname = "laser"\nmethod = "scan"\n{measurement or known}\n{rest}'
+    (folder / "recipe.toml").write_text(recipe_text(block / "part.step", part, table), encoding="utf-8")
     return folder / "recipe.toml"
 
 
@@ -86,43 +85,46 @@ def one(path):
     return inspect(load_recipe(path), Progress()).parts[0]
 
 
-def test_a_given_pose_that_is_not_refined_is_kept(tmp_path):
-    rows = Truth.read(BRACKET / "truth.json").cad_from_scan.matrix.tolist()
-    scan = f"files = [{json.dumps(str(BRACKET / 'scan.ply'))}]\n"
-    path = recipe(tmp_path, measurement=scan + f'alignment = {{ start = "pose", matrix = {rows}, refine = false }}')
+def test_a_given_pose_that_is_not_refined_is_kept(tmp_path, block):
+    rows = Pose.small(np.array([1e-4, -2e-4, 3e-4, 0.05, -0.04, 0.02]), np.zeros(3)).matrix.tolist()
+    scan = f"files = [{json.dumps(str(block / 'scan.txt'))}]\n"
+    path = recipe(
+        tmp_path, block, measurement=scan + f'alignment = {{ start = "pose", matrix = {rows}, refine = false }}'
+    )
     part = one(path)
     np.testing.assert_allclose(part.alignments[0].cad_from_measured.matrix, rows, atol=1e-9)
     assert part.deviation.observed.any()
 
 
-def test_excluded_boxes_are_neither_measured_nor_judged(tmp_path):
-    path = recipe(tmp_path, "tolerance = [-0.1, 0.1]\nexclude = [ { box = [[30, 40, -1], [50, 60, 30]] } ]")
+def test_excluded_boxes_are_neither_measured_nor_judged(tmp_path, block):
+    path = recipe(tmp_path, block, "tolerance = [-0.1, 0.1]\nexclude = [ { box = [[10, 5, -1], [30, 25, 30]] } ]")
     record = inspect(load_recipe(path), Progress())
     part, nodes = record.parts[0], record.nominal.mesh.nodes
-    inside = ((nodes > [30, 40, -1]) & (nodes < [50, 60, 30])).all(axis=1)
+    inside = ((nodes > [10, 5, -1]) & (nodes < [30, 25, 30])).all(axis=1)
     assert inside.any()
     assert not part.deviation.observed[inside].any()
     assert not (part.verdict[inside] > 0).any()
 
 
-def test_a_warm_part_is_measured_as_at_twenty_degrees(tmp_path):
-    cold = one(recipe(tmp_path))
-    path = recipe(tmp_path, rest="[report]\nbudget = { temperature = 30.0, expansion = 24e-6 }")
+def test_a_warm_part_is_measured_as_at_twenty_degrees(tmp_path, block):
+    cold = one(recipe(tmp_path, block))
+    path = recipe(tmp_path, block, rest="[report]\nbudget = { temperature = 30.0, expansion = 24e-6 }")
     warm = one(path)
     assert any("20 °C" in remark for remark in warm.remarks)
     size_cold, size_warm = (np.ptp(np.percentile(p.points_cad, [5, 95], axis=0), axis=0) for p in (cold, warm))
     np.testing.assert_allclose(size_cold / size_warm, 1 + 24e-5, atol=5e-5)
 
 
-def test_files_aligned_separately_have_an_alignment_each(tmp_path):
-    scan = json.dumps(str(BRACKET / "scan.ply"))
-    path = recipe(tmp_path, measurement=f'files = [{scan}, {scan}]\nframes = "separate"')
+def test_files_aligned_separately_have_an_alignment_each(tmp_path, block):
+    scan = json.dumps(str(block / "scan.txt"))
+    start = 'alignment = { start = "identity" }'
+    path = recipe(tmp_path, block, measurement=f'files = [{scan}, {scan}]\nframes = "separate"\n{start}')
     assert len(one(path).alignments) == 2
 
 
-def test_a_section_beside_the_part_is_warned_of(tmp_path):
+def test_a_section_beside_the_part_is_warned_of(tmp_path, block):
     planes = "{ point = [999, 0, 0], normal = [1, 0, 0] }, { point = [30, 0, 0], normal = [1, 0, 0] }"
-    lines = check(recipe(tmp_path, rest=f"[report]\nsections = [ {planes} ]"))
+    lines = check(recipe(tmp_path, block, rest=f"[report]\nsections = [ {planes} ]"))
     assert [line for line in lines if "does not meet" in line] == [
         "The plane of report.sections[0] does not meet the part, so there is no profile of it."
     ]
@@ -134,18 +136,22 @@ def waves(name, box):
     return f'[[part.features]]\nname = "{name}"\nkind = "waviness"\n{place}\n'
 
 
-def test_a_feature_marked_where_nothing_is_or_nothing_was_measured_is_warned_of(tmp_path):
+def test_a_feature_marked_where_nothing_is_or_nothing_was_measured_is_warned_of(tmp_path, block):
     boxes = {"beside": [[200, 0, 0], [210, 9, 9]], "beneath": [[-1, -1, -1], [99, 99, 0.01]]}
-    path = recipe(tmp_path, "".join(waves(name, box) for name, box in boxes.items()))
+    above = [line for line in (block / "scan.txt").read_text("utf-8").splitlines() if float(line.split()[2]) > 1.0]
+    (tmp_path / "scan.txt").write_text("\n".join(above), encoding="utf-8")
+    start = 'files = "scan.txt"\nalignment = { start = "identity" }'
+    path = recipe(tmp_path, block, measurement=start, part="".join(waves(name, box) for name, box in boxes.items()))
     beside = "No node of the part lies in the place marked for the feature 'beside': it may lie beside it."
     assert [line for line in check(path) if "feature" in line] == [beside]
     beneath = "laser observed no node in the place marked for the feature 'beneath'."
     assert inspect(load_recipe(path), Progress()).warnings == (beside, beneath)
 
 
-def test_check_reads_everything_and_measures_nothing(tmp_path):
-    lines = check(recipe(tmp_path))
-    assert any("59394" in line.replace(" ", "") for line in lines)
+def test_check_reads_everything_and_measures_nothing(tmp_path, block):
+    count = len((block / "scan.txt").read_text("utf-8").splitlines())
+    lines = check(recipe(tmp_path, block))
+    assert any(f"laser: {count} points" in line for line in lines)
 
 
 @pytest.mark.parametrize(
@@ -156,9 +162,9 @@ def test_check_reads_everything_and_measures_nothing(tmp_path):
         ("nan nan nan\n" * 50, 2, "points"),
     ],
 )
-def test_clouds_with_nothing_in_them_end_in_a_sentence(tmp_path, text, status, words):
+def test_clouds_with_nothing_in_them_end_in_a_sentence(tmp_path, block, text, status, words):
     (tmp_path / "scan.xyz").write_text(text, encoding="utf-8")
-    path = recipe(tmp_path, measurement='files = ["scan.xyz"]')
+    path = recipe(tmp_path, block, measurement='files = ["scan.xyz"]')
     ended = subprocess.run(
         [sys.executable, "-m", "inspect3d", "run", str(path), "-o", str(tmp_path / "out")],
         capture_output=True,
@@ -172,7 +178,7 @@ def test_clouds_with_nothing_in_them_end_in_a_sentence(tmp_path, text, status, w
     assert (tmp_path / "out").exists() == (status == 1)
 
 
-def test_an_interrupted_run_leaves_the_earlier_results_and_nothing_half_written(tmp_path, monkeypatch):
+def test_an_interrupted_run_leaves_the_earlier_results_and_nothing_half_written(tmp_path, block, monkeypatch):
     out = tmp_path / "out"
     out.mkdir()
     (out / "results.json").write_text("{}", encoding="utf-8")
@@ -182,42 +188,38 @@ def test_an_interrupted_run_leaves_the_earlier_results_and_nothing_half_written(
 
     monkeypatch.setattr("inspect3d.report.write.write_report", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        run(recipe(tmp_path), out)
+        run(recipe(tmp_path, block), out)
     assert (out / "results.json").read_text(encoding="utf-8") == "{}"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "recipe.toml"]
 
 
-def test_a_folder_that_holds_something_else_is_not_replaced(tmp_path):
+def test_a_folder_that_holds_something_else_is_not_replaced(tmp_path, block):
     out = tmp_path / "out"
     out.mkdir()
     (out / "thesis.txt").write_text("years of work", encoding="utf-8")
     with pytest.raises(InputError, match="not a folder of results"):
-        run(recipe(tmp_path), out)
+        run(recipe(tmp_path, block), out)
     assert (out / "thesis.txt").exists()
 
 
-def test_results_that_cannot_be_written_are_refused_before_anything_is_measured(tmp_path):
+def test_results_that_cannot_be_written_are_refused_before_anything_is_measured(tmp_path, block):
     (tmp_path / "file").write_text("no folder", encoding="utf-8")
     with pytest.raises(InputError, match=r"cannot be written: .*Choose another folder"):
-        run(recipe(tmp_path), tmp_path / "file" / "out")
+        run(recipe(tmp_path, block), tmp_path / "file" / "out")
     if os.geteuid() != 0:  # root may write anywhere
         (tmp_path / "locked").mkdir(mode=0o555)
         with pytest.raises(InputError, match="Permission denied"):
-            run(recipe(tmp_path), tmp_path / "locked" / "out")
+            run(recipe(tmp_path, block), tmp_path / "locked" / "out")
 
 
 @pytest.mark.parametrize(
-    ("there", "instead"),
+    ("part", "measurement"),
     [
-        ("[[measurements]]", "exclude = [ { faces = [9999] } ]\n\n[[measurements]]"),
-        ('units = "mm"\nnoise', 'alignment = { fit = "datum", datum = [ { faces = [9999] } ] }\nunits = "mm"\nnoise'),
+        ("exclude = [ { faces = [9999] } ]", ""),
+        ("", 'alignment = { fit = "datum", datum = [ { faces = [9999] } ] }'),
     ],
 )
-def test_a_face_that_the_model_does_not_have_is_refused_before_measuring(tmp_path, there, instead):
-    for name in ("part.step", "scan.ply"):
-        (tmp_path / name).write_bytes((BRACKET / name).read_bytes())
-    text = (BRACKET / "recipe.toml").read_text("utf-8")
-    assert there in text
-    (tmp_path / "recipe.toml").write_text(text.replace(there, instead, 1), encoding="utf-8")
-    with pytest.raises(InputError, match=r"part\.step has no face 9999; its faces are 0 to \d+\."):
-        check(tmp_path / "recipe.toml")
+def test_a_face_that_the_model_does_not_have_is_refused_before_measuring(tmp_path, block, part, measurement):
+    scan = measurement and f"files = [{json.dumps(str(block / 'scan.txt'))}]\n{measurement}"
+    with pytest.raises(InputError, match=r"part\.step has no face 9999; its faces are 0 to 9\."):
+        check(recipe(tmp_path, block, part, scan))
