@@ -19,7 +19,7 @@ from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.space import EVERY_NODE
 from inspect3d.correlation.system import System
 
-CHANCE = 0.01  # of noise making any node of a map stand out in one of the tests
+CHANCE = 0.01  # of noise making any node of a map stand out in any test
 BESIDE = 2.5, 3.0, 3.2  # standard uncertainties that do so beside such a node: of means, facets and bumps
 ALONE = 3.5  # the same of a node by itself
 WIDTHS = (1, 2, 4)  # steps of averaging over neighbours that make bumps from a node
@@ -82,11 +82,12 @@ class LackOfFit:
 
     def squared(
         self, within: System, rows: sparse.csr_matrix, times: float, reach: Callable[[Booleans], Booleans]
-    ) -> Floats:
-        """Return the squared size (n,) mm² of the error of the model where there is one beyond doubt, and around.
+    ) -> tuple[Floats, Booleans]:
+        """Return the squared size (n,) mm² of the error of the model, and the nodes (n,) that prove it.
 
         Of as many nodes as a map has some stand out by chance. So much as noise hardly ever reaches in any of them
-        proves an error; as far as the same control points reach, less than that counts as well.
+        proves an error; as far as the same control points reach, and those of nodes there that stand out by themselves,
+        less than that counts as well.
 
         Parameters
         ----------
@@ -96,9 +97,13 @@ class LackOfFit:
         reach : returns the nodes that move together with some
         """
         tests = tuple(self._tests(within, rows, times))
-        proof = float(norm.isf(CHANCE / 2 / len(self.increment)))
-        near = reach(np.any([test.beyond > proof for test in tests], axis=0))
-        return np.max([test.found(near) for test in tests], axis=0)
+        proof = float(norm.isf(CHANCE / 2 / len(tests) / len(self.increment)))
+        most = np.max([test.beyond for test in tests], axis=0)
+        proven = most > proof
+        near, before = reach(proven), np.zeros(len(most), dtype=bool)
+        while (near & ~before).any():
+            near, before = near | reach(near & (most > ALONE)), near
+        return np.max([test.found(near) for test in tests], axis=0), proven
 
     @property
     def sign(self) -> Floats:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.camera import View
@@ -20,6 +21,7 @@ from inspect3d.correlation.spline_space import SplineSpace
 from inspect3d.correlation.system import System
 
 MOST = 0.5  # share of the nodes of a face that are missed, from which on all of them are
+FEWEST, MOSTLY = 3, 0.5  # nodes that prove a step, and their share of those that prove any error, at the least
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +73,9 @@ def model_error(
     """Return what splines miss of a part.
 
     Where faces have come apart beyond doubt, that is one error of known size, and what else is missed is looked for
-    beyond it. Where facets do not fit whatever their nodes do, as on a step, the map cannot tell which side of it a
-    node is on: what is missed is as large as the map is uneven over the node and its neighbours.
+    beyond it. On a step facets do not fit whatever their nodes do, and the map cannot tell which side of it a node is
+    on: what is missed is as large as the map is uneven over the node and its neighbours. A step goes on from there as
+    far as the map stays half as uneven.
 
     Parameters
     ----------
@@ -94,11 +97,13 @@ def model_error(
         lack = lack_of_fit(scene, parted.left, views, weights, freedom, columns)
         within, rows = parted.system, parted.rows
     strained = unresolved(scene, lack.left, noise, summed.fitted) ** 2
-    squared = np.maximum(lack.squared(within, rows, times, space.sharing), strained)
+    squared, proven = lack.squared(within, rows, times, space.sharing)
+    squared = np.maximum(squared, strained)
     missed = _around(lack, (squared > 0) | (gaps > plain))
-    uneven = _around(lack, missed & summed.doubted)
-    squared = np.maximum(squared, np.where(uneven, _spread(lack, space.rows(scene) @ motion), 0.0))
-    missed |= uneven
+    uneven = _spread(lack, space.rows(scene) @ motion)
+    on_step = _around(lack, (missed & summed.doubted) | _steps(lack, uneven, proven, summed.doubted))
+    squared = np.maximum(squared, np.where(on_step, uneven, 0.0))
+    missed |= on_step
     patch = space.patch
     share = np.bincount(patch, missed) / np.maximum(np.bincount(patch), 1)
     rough = lack.sign * np.sqrt(np.maximum(squared - gaps, 0.0))
@@ -108,6 +113,25 @@ def model_error(
 def _around(lack: LackOfFit, some: Booleans) -> Booleans:
     """Tell which nodes are some, or neighbours of them."""
     return np.asarray(lack.near @ some.astype(np.float64) > 0)
+
+
+def _steps(lack: LackOfFit, uneven: Floats, proven: Booleans, doubted: Booleans) -> Booleans:
+    """Tell which nodes (n,) lie on steps: connected, about as uneven as where facets prove one.
+
+    Parameters
+    ----------
+    uneven : (n,) mm², the variance of the map around each node
+    proven, doubted : (n,), see `LackOfFit.squared` and `Misfit`
+    """
+    seeds = proven & doubted
+    if not seeds.any():
+        return seeds
+    steep = np.flatnonzero(uneven > np.median(uneven[seeds]) / 4)
+    number, part = connected_components(lack.near[steep][:, steep], directed=False)
+    counts = [np.bincount(part, some[steep], minlength=number) for some in (proven, seeds)]
+    on_step = np.zeros(len(uneven), dtype=bool)
+    on_step[steep] = ((counts[1] >= FEWEST) & (counts[1] >= MOSTLY * counts[0]))[part]
+    return on_step
 
 
 def _spread(lack: LackOfFit, deviation: Floats) -> Floats:

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from inspect3d.arrays import Floats
 from inspect3d.nominal.brep import Brep
+from inspect3d.nominal.sewing import GAP
 
 LEAST, MOST = 6, 200
 
 
 @dataclass(frozen=True, eq=False)
 class Border:
-    """Places along an edge that two faces share, or one face with itself at a seam.
+    """Places along an edge that two faces share, or one face with itself at a seam; or along two edges that coincide.
 
     Parameters
     ----------
@@ -31,7 +34,11 @@ class Border:
 
 
 def borders(brep: Brep, faces: Collection[int], spacing: float) -> tuple[Border, ...]:
-    """Return the borders between some faces, by number, and their seams, with a place about every `spacing` mm."""
+    """Return the borders between some faces, by number, and their seams, with a place about every `spacing` mm.
+
+    Faces that do not share an edge border on each other where one of theirs runs all along another, nearer than what is
+    sewn in an IGES file.
+    """
     sides: dict[int, list[tuple[int, bool]]] = {}
     for number in faces:
         for edge, reversed_there in _sides(brep, number):
@@ -43,7 +50,41 @@ def borders(brep: Brep, faces: Collection[int], spacing: float) -> tuple[Border,
             points, along = _placed(curve, spacing)
             turned = np.stack([-along if reversed_there else along for _, reversed_there in both])
             found.append(Border((both[0][0], both[1][0]), points, turned))
-    return tuple(found)
+    rims = {edge: both[0] for edge, both in sides.items() if len(both) == 1 and len(brep.edge_faces[edge]) == 1}
+    return (*found, *_touching(brep, rims, spacing))
+
+
+def _touching(brep: Brep, rims: dict[int, tuple[int, bool]], spacing: float) -> Iterator[Border]:
+    """Yield the borders of faces along rims that coincide; of each rim its face, and whether it is turned round."""
+    placed = {}
+    for edge, (_, reversed_there) in rims.items():
+        if (curve := brep.curves[edge]) is not None:
+            points, along = _placed(curve, spacing)
+            placed[edge] = points, -along if reversed_there else along
+    trees = {edge: cKDTree(points) for edge, (points, _) in placed.items()}
+    for one, other in combinations(placed, 2):
+        shorter, longer = sorted((one, other), key=lambda edge: _length(brep.curves[edge]))
+        points, along = placed[shorter]
+        away, nearest = trees[longer].query(points)
+        if away.max() < spacing + GAP * brep.diagonal and _farthest(points, brep.edges[longer]) < GAP * brep.diagonal:
+            same = np.sign((along * placed[longer][1][nearest]).sum(axis=1, keepdims=True))
+            yield Border((rims[shorter][0], rims[longer][0]), points, np.stack([along, same * along]))
+
+
+def _farthest(points: Floats, edge: Any) -> float:
+    """Return the largest distance of points (s, 3) from an edge, mm."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
+    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+    from OCP.gp import gp_Pnt
+
+    vertices = (BRepBuilderAPI_MakeVertex(gp_Pnt(*point)).Vertex() for point in points.tolist())
+    return max(BRepExtrema_DistShapeShape(vertex, edge).Value() for vertex in vertices)
+
+
+def _length(curve: Any) -> float:
+    from OCP.GCPnts import GCPnts_AbscissaPoint
+
+    return float(GCPnts_AbscissaPoint.Length_s(curve))
 
 
 def _sides(brep: Brep, number: int) -> list[tuple[int, bool]]:
@@ -62,10 +103,9 @@ def _sides(brep: Brep, number: int) -> list[tuple[int, bool]]:
 
 def _placed(curve: Any, spacing: float) -> tuple[Floats, Floats]:
     """Return points (s, 3) mm and unit tangents all along a curve."""
-    from OCP.GCPnts import GCPnts_AbscissaPoint
     from OCP.gp import gp_Pnt, gp_Vec
 
-    count = int(np.clip(np.ceil(GCPnts_AbscissaPoint.Length_s(curve) / spacing), LEAST, MOST))
+    count = int(np.clip(np.ceil(_length(curve) / spacing), LEAST, MOST))
     at = np.linspace(curve.FirstParameter(), curve.LastParameter(), 2 * count + 1)[1::2]
     point, tangent = gp_Pnt(), gp_Vec()
     points, along = np.empty((count, 3)), np.empty((count, 3))

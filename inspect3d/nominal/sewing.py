@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-_GAP = 1e-4
+GAP = 1e-4
 """Edges nearer than this share of the diagonal are one."""
 
 
@@ -19,7 +19,7 @@ def sewn(shape: Any, faces: list[Any], diagonal: float) -> tuple[Any, list[Any]]
     """
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
 
-    sewing = BRepBuilderAPI_Sewing(_GAP * diagonal)
+    sewing = BRepBuilderAPI_Sewing(GAP * diagonal)
     sewing.Load(shape)
     sewing.Perform()
     result = _outside_out(sewing.SewedShape())
