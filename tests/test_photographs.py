@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
+
 import cv2
 import numpy as np
 import pytest
@@ -59,6 +62,24 @@ def test_the_focal_length_is_that_of_the_exif_data(tmp_path, tags, focal):
     Image.fromarray(scene()).save(tmp_path / "a.jpg", exif=exif, quality=95)
     found = read_photograph(tmp_path / "a.jpg").focal
     assert found == (pytest.approx(focal) if focal else None)
+
+
+@pytest.mark.parametrize("tags", [{0x920A: (50, 1), 0xA405: 0}, {0x920A: (50, 0), 0xA20E: (1, 0)}, {0xA405: b"long"}])
+def test_exif_data_that_are_no_numbers_tell_no_focal_length(tmp_path, tags):
+    exif = Image.Exif()
+    exif.get_ifd(0x8769).update(tags)
+    Image.fromarray(scene()).save(tmp_path / "a.jpg", exif=exif, quality=95)
+    assert read_photograph(tmp_path / "a.jpg").focal is None
+
+
+def test_a_picture_whose_header_names_more_pixels_than_any_camera_has_is_refused(tmp_path):
+    head = struct.pack(">IIBBBBB", 60_000, 60_000, 8, 0, 0, 0, 0)
+    content = b"\x89PNG\r\n\x1a\n"
+    for kind, data in ((b"IHDR", head), (b"IDAT", zlib.compress(b"\0" * 1000)), (b"IEND", b"")):
+        content += struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    (tmp_path / "a.png").write_bytes(content)
+    with pytest.raises(InputError, match=r"a\.png cannot be read as a picture"):
+        read_photograph(tmp_path / "a.png")
 
 
 def test_a_turn_in_the_exif_data_is_told_and_not_made(tmp_path):

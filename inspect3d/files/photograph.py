@@ -93,7 +93,10 @@ def _pixels(path: Path) -> tuple[Any, float]:
     import cv2
 
     data = np.fromfile(path, dtype=np.uint8)
-    pixels = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    try:
+        pixels = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    except cv2.error:  # its header names more pixels than OpenCV takes
+        pixels = None
     if pixels is None:
         raise InputError(f"{path.name} cannot be read as a picture: it must be {KINDS}, and whole.")
     if pixels.dtype not in (np.uint8, np.uint16):
@@ -118,14 +121,23 @@ def _exif(path: Path, longer: int) -> tuple[float | None, bool]:
         with Image.open(path) as picture:
             tags = picture.getexif()
             details = tags.get_ifd(EXIF)
-    except (OSError, UnidentifiedImageError, ValueError, SyntaxError):
+    except (OSError, UnidentifiedImageError, ValueError, SyntaxError, Image.DecompressionBombError):
         return None, False
     turned = tags.get(ORIENTATION, 1) not in (0, 1)
-    focal, film = (float(details.get(tag) or 0) for tag in (FOCAL, FOCAL_FILM))
-    per_unit = float(details.get(RESOLUTION) or 0)
-    unit = PER_MILLIMETRE.get(int(details.get(RESOLUTION_UNIT) or 0))
-    if focal > 0 and per_unit > 0 and unit:
-        return focal * per_unit / unit, turned
+    focal, film, per_unit, unit = (
+        _number(details.get(tag)) for tag in (FOCAL, FOCAL_FILM, RESOLUTION, RESOLUTION_UNIT)
+    )
+    if focal > 0 and per_unit > 0 and unit in PER_MILLIMETRE:
+        return focal * per_unit / PER_MILLIMETRE[int(unit)], turned
     if film > 0:
         return film / FILM * longer, turned
     return None, turned
+
+
+def _number(value: Any) -> float:
+    """Return a value of the EXIF data, which may be of any kind, as a number; zero where it is none."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, ArithmeticError):
+        return 0.0
+    return number if np.isfinite(number) else 0.0
