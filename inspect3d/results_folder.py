@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -19,11 +18,10 @@ def replaced(out: Path) -> Iterator[Path]:
     Raises
     ------
     InputError
-        `out` is there and is no folder of results, or cannot be written.
+        `out` is there and is no folder of results, before the block or after it, or cannot be written.
     """
-    out = Path(os.path.abspath(out))
-    if out.exists() and not _may_be_replaced(out):
-        raise InputError(f"{out} is not a folder of results: choose another one, or remove it yourself.")
+    out = out.resolve()
+    _require_results(out)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         folder = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
@@ -32,17 +30,26 @@ def replaced(out: Path) -> Iterator[Path]:
     try:
         folder.chmod(0o755)
         yield folder
-        if out.exists():
-            former = folder.with_name(folder.name + "-former")
-            out.rename(former)
-            folder.rename(out)
-            shutil.rmtree(former)
-        else:
-            folder.rename(out)
+        _require_results(out)
+        _put(folder, out)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _may_be_replaced(out: Path) -> bool:
-    """Tell whether `out` is a folder that is empty or holds the results of an earlier run."""
-    return out.is_dir() and (not any(out.iterdir()) or (out / "results.json").is_file())
+def _put(folder: Path, out: Path) -> None:
+    """Give a folder the name `out`; what is there goes once it has it, and stays where that fails."""
+    former = folder.with_name(folder.name + "-former")
+    try:
+        if out.exists():
+            out.rename(former)
+        folder.rename(out)
+    finally:
+        if former.exists() and not out.exists():
+            former.rename(out)
+    shutil.rmtree(former, ignore_errors=True)
+
+
+def _require_results(out: Path) -> None:
+    """Refuse a folder that is there and is neither empty nor holds the results of an earlier run."""
+    if out.exists() and not (out.is_dir() and (not any(out.iterdir()) or (out / "results.json").is_file())):
+        raise InputError(f"{out} is not a folder of results: choose another one, or remove it yourself.")

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from inspect3d.pose import Pose
 from inspect3d.progress import Progress
 from inspect3d.recipe import load_recipe
 from inspect3d.register.gauge import best_fit
+from inspect3d.results_folder import replaced
 from inspect3d.virtual.truth import Truth
 from tests.notched import recipe_text, write_notched
 
@@ -200,6 +202,48 @@ def test_a_folder_that_holds_something_else_is_not_replaced(tmp_path, block):
     with pytest.raises(InputError, match="not a folder of results"):
         run(recipe(tmp_path, block), out)
     assert (out / "thesis.txt").exists()
+
+
+def written(out, words):
+    """Return the block that writes results into `out`."""
+
+    @contextmanager
+    def writing():
+        with replaced(out) as folder:
+            yield
+            (folder / "results.json").write_text(words, encoding="utf-8")
+
+    return writing()
+
+
+def test_of_two_runs_into_one_folder_at_once_the_later_one_stays_and_nothing_else(tmp_path):
+    with written(tmp_path / "out", "later"), written(tmp_path / "out", "earlier"):
+        pass
+    assert (tmp_path / "out" / "results.json").read_text("utf-8") == "later"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_what_somebody_puts_into_the_folder_during_a_run_stays(tmp_path):
+    def disturbed():
+        with written(tmp_path / "out", "{}"):
+            (tmp_path / "out").mkdir()
+            (tmp_path / "out" / "thesis.txt").write_text("years of work", encoding="utf-8")
+
+    with pytest.raises(InputError, match="not a folder of results"):
+        disturbed()
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["thesis.txt"]
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_results_behind_a_link_are_replaced_where_they_lie(tmp_path):
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "out").symlink_to(tmp_path / "disk")
+    for words in ("first", "second"):
+        with written(tmp_path / "out", words):
+            pass
+        assert (tmp_path / "disk" / "results.json").read_text("utf-8") == words
+    assert (tmp_path / "out").is_symlink()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["disk", "out"]
 
 
 def test_results_that_cannot_be_written_are_refused_before_anything_is_measured(tmp_path, block):
