@@ -27,7 +27,7 @@ from inspect3d.recipe_alignment import Start
 from inspect3d.record import MeasuredPart
 from inspect3d.register.alignment import Alignment, NoAlignmentError
 from inspect3d.register.landmarks import landmark_covariance, similarity_from_landmarks
-from inspect3d.register.register import Register
+from inspect3d.register.register import EXACT, Register
 from inspect3d.register.similarity import Similarity
 
 REFERENCE = 20.0  # degC at which dimensions hold (ISO 1)
@@ -114,6 +114,11 @@ def _of_clouds(
             scale_sigma=measurement.scale_sigma,
         )
         found = deviate(measurement.clouds, alignments, nominal, _counted(recipe, nominal))
+    if not found.noise > EXACT * nominal.diagonal:
+        raise MeasurementError(
+            "The points have no scatter at all, as points of a CAD model have none: nothing tells how sure they are. "
+            "State their `noise`."
+        )
     return replace(
         _judged(ended, found.deviation, found.alignments, table, recipe, nominal, measurement.scale_known),
         covariance=found.covariance,

@@ -157,6 +157,15 @@ def test_maps_in_given_poses_keep_them_when_weak_motions_go(nominal):
     assert found.gauge.startswith("2 motions")
 
 
+def test_weak_motions_that_leave_the_common_nodes_at_rest_are_not_taken_out(nominal):
+    value, weak = np.zeros(len(nominal.mesh)), np.zeros((len(nominal.mesh), 1))
+    found = pair(
+        nominal, made(nominal, "a", value + 0.01, refined=False), made(nominal, "b", value, refined=False, weak=weak)
+    )
+    np.testing.assert_allclose(found.difference, 0.01)
+    assert found.gauge.startswith("Both maps stay in the poses they were given")
+
+
 def test_a_defect_that_one_method_shows_does_not_tilt_the_difference(nominal):
     x, y = nominal.mesh.nodes[:, 0], nominal.mesh.nodes[:, 1]
     bump = 0.3 * np.exp(-((x - 45) ** 2 + (y - 35) ** 2) / 40)

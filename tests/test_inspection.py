@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 
 from inspect3d.inspection import check, inspect, run
+from inspect3d.nominal.load import load_nominal
 from inspect3d.outcome import InputError, Status
 from inspect3d.pose import Pose
 from inspect3d.progress import Progress
 from inspect3d.recipe import load_recipe
 from inspect3d.register.gauge import best_fit
+from inspect3d.register.symmetry import surface_points
 from inspect3d.results_folder import replaced
 from inspect3d.virtual.truth import Truth
 from tests.notched import recipe_text, write_notched
@@ -202,6 +204,19 @@ def test_a_folder_that_holds_something_else_is_not_replaced(tmp_path, block):
     with pytest.raises(InputError, match="not a folder of results"):
         run(recipe(tmp_path, block), out)
     assert (out / "thesis.txt").exists()
+
+
+def test_points_of_the_cad_itself_want_their_noise_stated(tmp_path, block):
+    points, _ = surface_points(load_nominal(block / "part.step", element_size=8.0).surface, 6000)
+    np.savetxt(tmp_path / "scan.txt", points, fmt="%.17g")
+    table = 'files = "scan.txt"\nalignment = { start = "identity" }\n'
+    part = one(recipe(tmp_path, block, measurement=table))
+    assert part.status is Status.FAILED
+    assert "no scatter at all" in part.reason
+    part = one(recipe(tmp_path, block, measurement=table + "noise = 0.005"))
+    seen = part.deviation.observed
+    assert np.abs(part.deviation.value[seen]).max() < 1e-9
+    assert (part.deviation.sigma[seen] > 1e-4).all()
 
 
 def written(out, words):

@@ -13,7 +13,7 @@ from inspect3d.register.alignment import NoAlignmentError
 from inspect3d.register.landmarks import landmark_covariance, pose_from_landmarks
 from inspect3d.register.mobility import jacobian
 from inspect3d.register.register import Register
-from inspect3d.register.symmetry import is_symmetry
+from inspect3d.register.symmetry import is_symmetry, surface_points
 from tests.jit import printed
 from tests.sheets import plane, plane_normals, scanned, sheet
 
@@ -202,10 +202,22 @@ assert abs(before - 0.3) < 1e-12 and abs(translations[0, 2]) < 1e-6
     assert with_jit == without
 
 
-def test_normals_that_point_into_the_material_do_not_hinder():
+@pytest.mark.parametrize("started", [False, True])
+def test_normals_that_point_into_the_material_do_not_hinder(started):
     nominal = sheet()
     points, normals = scanned(np.random.default_rng(5), 6000, noise=0.02)
     pose = any_pose(8)
-    alignment = Register(nominal)(Cloud("scan", pose(points), -pose.turned(normals)))
-    left = alignment.cad_from_measured @ pose
-    assert np.abs(left(nominal.mesh.nodes) - nominal.mesh.nodes).max() < 0.02
+    start = Pose.small(np.array([2e-3, -1e-3, 2e-3, 0.1, -0.1, 0.2]), np.zeros(3)) @ pose.inverse() if started else None
+    register = Register(nominal, start=start)
+    inward = register(Cloud("scan", pose(points), -pose.turned(normals))).cad_from_measured
+    plain = register(Cloud("scan", pose(points))).cad_from_measured
+    assert np.abs((inward @ pose)(nominal.mesh.nodes) - nominal.mesh.nodes).max() < 0.02
+    np.testing.assert_allclose(inward(pose(points)), plain(pose(points)), atol=1e-3)
+
+
+def test_points_of_the_cad_itself_lie_on_it():
+    nominal = box((60.0, 40.0, 20.0))
+    points, _ = surface_points(nominal.surface, 3000)
+    alignment = Register(nominal, start=Pose.identity())(Cloud("cad", points))
+    np.testing.assert_allclose(alignment.cad_from_measured(points), points, atol=1e-9)
+    assert np.count_nonzero(alignment.used) > 2000

@@ -17,6 +17,7 @@ from inspect3d.register.gauge import Gauge, best_fit
 LEFT = 1e-3  # share of a weak motion that must be left beside the rigid ones for it to be one of its own
 PROBABILITY = 0.95  # that such motions in the difference are more than chance
 ROUNDS = 50
+STAYING = "Both maps stay in the poses they were given; no motion is taken out of their difference."
 SETTLED = 1e-4  # of the largest area: change of the weights at which the fit ends
 
 
@@ -84,8 +85,7 @@ def common_gauge(a: MeasuredMap, b: MeasuredMap, mesh: InspectionMesh, at: Integ
     weak = np.concatenate([c.weak[np.searchsorted(c.node, at)] for c in (a.covariance, b.covariance)], axis=1)
     placed = not (a.covariance.refined or b.covariance.refined)
     if placed and not weak.shape[1]:
-        words = "Both maps stay in the poses they were given; no motion is taken out of their difference."
-        return CommonGauge(np.zeros((len(at), 0)), np.zeros((0, len(at))), 0, same_coat, words)
+        return CommonGauge(np.zeros((len(at), 0)), np.zeros((0, len(at))), 0, same_coat, STAYING)
     growth = not (a.covariance.scale_known and b.covariance.scale_known)
     difference = a.deviation.value[at] - b.deviation.value[at]
     places = mesh.nodes[at], mesh.normals[at], mesh.areas[at]
@@ -124,6 +124,8 @@ def _words(a: MeasuredMap, b: MeasuredMap, placed: bool, growth: bool, weak: int
         which = " and ".join(each.name for each in (a, b) if each.covariance.weak.shape[1])
         number = "a motion" if weak == 1 else f"{weak} motions"
         motions.append(f"{number} of cameras and shape together that the pictures of {which} hardly tell")
+    if not motions:
+        return STAYING
     taken = " and ".join(motions)
     verb = "is" if len(motions) == 1 and weak < 2 else "are"
     return f"{taken[0].upper()}{taken[1:]} {verb} taken out of both, by a robust best fit over their common nodes."

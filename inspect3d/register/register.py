@@ -29,6 +29,8 @@ NEAR = 0.03  # share of the cloud's extent within which a point is an inlier
 REGISTERS = 0.8  # share of inliers above which a cloud registers, if it does so in one pose only
 FITS = 0.5  # share of inliers below which a cloud is refused
 ROUGH = 5.0  # noises; a fit rougher than this is refused unless the cloud registers beyond doubt
+OUTWARD = 0.5  # share of the points whose normals must agree with the CAD's for their sign to be believed
+EXACT = 1e-9  # share of the diagonal below which distances are rounding: points of the CAD itself have no scatter
 FEW, MANY = 1500, 20_000  # points of the search, and of the last refinement
 
 
@@ -168,7 +170,7 @@ class Register:
         """Return the pose the alignment from a given start ends in, or the start itself."""
         if not self.refine:
             return start
-        many = thinned(cloud, MANY, even=False)
+        many = self._many(cloud, start)
         width = min(0.05 * self.nominal.diagonal, self.reach or np.inf)
         icp = RobustIcp(first_width=width, grows=not self.scale_known)
         rough = icp(many.every(max(len(many.points) // FEW, 1)), self.nominal.surface, start)
@@ -177,7 +179,13 @@ class Register:
         return fit.pose
 
     def _fine(self, cloud: Cloud, start: Similarity) -> Similarity:
-        return settled(thinned(cloud, MANY, even=False), self.nominal.surface, start, not self.scale_known).pose
+        return settled(self._many(cloud, start), self.nominal.surface, start, not self.scale_known).pose
+
+    def _many(self, cloud: Cloud, start: Similarity) -> Thinned:
+        """Return many points of the cloud; normals that point into the material in the start count without a sign."""
+        many = thinned(cloud, MANY, even=False)
+        outward = fitted(many, self.nominal.surface, start).agrees.mean() > OUTWARD
+        return many if outward else replace(many, oriented=False)
 
     @staticmethod
     def _status(choice: Choice) -> Status:
@@ -189,7 +197,8 @@ class Register:
         """Return the alignment in a pose cad_from_centred, with what the points say about it."""
         sample = Thinned(cloud.points, np.zeros_like(cloud.points), oriented=False)
         fit = fitted(sample, self.nominal.surface, pose)
-        distance, width = fit.feet.distance, TUKEY * fit.scale * pose.scale
+        distance = fit.feet.distance
+        width = max(TUKEY * fit.scale * pose.scale, EXACT * self.nominal.diagonal)
         used = ~fit.feet.on_rim & (np.abs(distance) < min(width, self.reach or np.inf))
         if np.count_nonzero(used) < LEAST_POINTS:
             raise NoAlignmentError(
