@@ -20,12 +20,14 @@ from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import InputError, MeasurementError
 from inspect3d.pose import Pose
 from inspect3d.progress import running
+from inspect3d.triangulation.centre_sigma import centre_sigma
 from inspect3d.triangulation.features import Features, FindFeatures
 from inspect3d.triangulation.patches import FitPatches, Patched
 from inspect3d.triangulation.scale_bar import ScaleBar
 from inspect3d.triangulation.tie import Tie, TiePoints
 
 FEWEST_FEATURES, FEWEST_POINTS = 100, 30
+FEWEST_CENTRES = 3  # two centres lie as they may: a motion and a growth make any two of any other two
 SAMPLE = 2000
 NORMAL_LENS = 1.2  # of the longer side of a picture: the focal length that is tried where nothing tells it
 GIVEN = "The scale is that of the given cameras."
@@ -219,6 +221,7 @@ class Colmap:
                 *_left_out(source.photographs, placed),
                 remark,
                 _tie_words(tied),
+                *_centre_words(tied, rig),
                 _patch_words(patched, points, sigma, known),
                 NO_CUDA,
             ),
@@ -269,6 +272,22 @@ def _tie_words(tied: TiePoints) -> str:
     return (
         f"{len(tied.points)} features were tied over {len(tied.pixels) / len(tied.points):.1f} photographs each, on "
         f"average, and triangulated by COLMAP {version('pycolmap')}: {tied.error:.2f} px rms from where they were seen."
+    )
+
+
+def _centre_words(tied: TiePoints, rig: Rig | None) -> tuple[str, ...]:
+    """Return how well cameras that COLMAP placed are known against each other: parts of their distance to the part."""
+    placed = [view for view in tied.views if view is not None]
+    if len(placed) < FEWEST_CENTRES or (rig is not None and (rig.camera_from_cad or rig.camera_from_rig)):
+        return ()
+    sigma = centre_sigma(tied, rig is None)
+    sigma = sigma[np.isfinite(sigma)]
+    middle = np.median(tied.points, axis=0)
+    shares = 1e6 * sigma / np.array([np.linalg.norm(view.centre - middle) for view in placed])
+    return (
+        f"The centres of the cameras are known to {np.median(shares):.2g} µm, at the most {shares.max():.2g} µm, in "
+        "each metre of their distance to the part, against each other and along each axis (standard uncertainty, by "
+        f"the bundle adjustment with the lenses {'free' if rig is None else 'given'}).",
     )
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.picks import ideal_camera
+from inspect3d.correlation.start import DISTORTION
 from inspect3d.inspection import check, run
 from inspect3d.nominal.load import load_nominal
 from inspect3d.outcome import InputError, MeasurementError, Status
@@ -124,6 +126,19 @@ def test_a_start_without_landmarks_ends_at_the_true_map(folder):
     assert rms(z) < 1.5
     assert "found from the pictures alone" in " ".join(part.remarks)
     assert {"start_picture_1", "start_picture_2"} <= {figure.name for figure in part.figures}
+
+
+def test_pictures_of_different_sizes_are_those_of_cameras_of_their_own(folder):
+    views = rig()
+    grey = [cv2.imread(str(folder / name), cv2.IMREAD_UNCHANGED).astype(float) for name in ("left.png", "right.png")]
+    grey[1] = grey[1][30:-30, 40:-40]
+    lens = Lens(0.05 * 2450.0, 15.0, DISTORTION)
+    pictured = [Pictured(each, None, ideal_camera(2450.0, each.shape[::-1]), lens) for each in grey]
+    said = FindStart(load_nominal(folder / "part.ply"))(pictured)
+    points, off = load_nominal(folder / "part.ply").mesh.nodes, np.array([[0.0, 0.0], [40.0, 30.0]])
+    (best,) = said.trials
+    for found, true, cut in zip(best.views, views, off, strict=True):
+        assert rms(np.linalg.norm(found.project(points) + cut - true.project(points), axis=1)) < 4.0
 
 
 def test_without_a_focal_length_it_is_asked_for_before_anything_is_measured(folder):

@@ -111,6 +111,7 @@ def scaled(loose, nominal):
 def test_known_lenses_place_the_cameras_and_take_the_scale_from_the_cad(loose, scaled, nominal, truth):
     assert not loose.scale_known
     assert any("taken from the CAD" in remark for remark in loose.remarks)
+    assert any("centres of the cameras are known to" in remark for remark in loose.remarks)
     centres = np.array([view.centre for view in scaled.views(loose.views)])
     true = np.array([view.centre for view in truth.views])
     stand_off = np.linalg.norm(true - nominal.mesh.nodes.mean(axis=0), axis=1)
@@ -209,6 +210,18 @@ def test_photographs_of_different_sizes_are_told_of_and_refused_by_a_calibration
     assert any("different sizes" in remark for remark in Colmap().open(Files(folder, {"images": images})).remarks)
     with pytest.raises(InputError):
         Colmap().open(Files(folder, {"images": images, "cameras": (folder / "calibration.json",)}))
+
+
+def test_photographs_of_different_sizes_are_those_of_cameras_of_their_own(folder, tmp_path, nominal):
+    """One photograph is cut to a strip: its principal point is then taken to be in the middle of that."""
+    picture = cv2.imread(str(folder / NAMES[1]), cv2.IMREAD_UNCHANGED)
+    cv2.imwrite(str(tmp_path / "view2.png"), picture[20:-20])
+    images = (folder / NAMES[0], tmp_path / "view2.png", *(folder / name for name in NAMES[2:]))
+    method = Colmap(focal=2050.0)
+    found = method(method.open(Files(folder, {"images": images})), nominal)
+    sizes = {view.camera.size for view in found.views}
+    assert sizes == {(612, 512), (612, 472)}
+    assert len(found.clouds[0]) > 1000
 
 
 @pytest.mark.parametrize(

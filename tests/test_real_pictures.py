@@ -175,14 +175,30 @@ def test_a_cylinder_may_turn_and_slide(frames):
         assert "turn about the axis along (0, 0, 1)" in words
 
 
-def test_the_cylinder_is_found_and_measured_without_a_click(multidic, frames):
-    found = multidic(1, 57.0, picked=False)
+@pytest.fixture(scope="module")
+def found(multidic):
+    """Return frame 1 from a start that the pictures gave by themselves."""
+    return multidic(1, 57.0, picked=False)
+
+
+def test_the_cylinder_is_found_and_measured_without_a_click(found, frames):
     assert found.part.status is Status.FREE_MOTIONS
     assert "found from the pictures alone" in " ".join(found.part.remarks)
     radius, residual = fitted_radius(found.points)
     assert radius == pytest.approx(57.0, abs=0.1)
     assert radius == pytest.approx(fitted_radius(frames[0].points)[0], abs=0.02)
     assert np.sqrt(np.mean(residual**2)) < 0.020
+
+
+def test_nearly_every_node_is_observed_that_both_cameras_see_wherever_the_cylinder_was_turned_to(found):
+    nodes, normals, observed = found.mesh.nodes, found.mesh.normals, found.part.deviation.observed
+    seen = np.ones(len(nodes), dtype=bool)  # the node itself, not only a corner of a facet beside it
+    for view in found.part.views:
+        sight, at = view.centre - nodes, view.project(nodes)
+        seen &= (sight * normals).sum(axis=1) > np.cos(np.radians(65)) * np.linalg.norm(sight, axis=1)
+        seen &= ((at > 3) & (at < np.array(view.camera.size) - 4)).all(axis=1)
+    assert (observed & seen).sum() > 0.95 * seen.sum()
+    assert not (observed & ~seen).any()
 
 
 def test_frames_repeat_within_what_is_claimed(frames):

@@ -1,0 +1,93 @@
+"""How well bundle adjustment knows where cameras stand that it placed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from inspect3d.arrays import Floats
+from inspect3d.camera import View
+from inspect3d.triangulation.tie import TiePoints
+
+POSE, LENS = 6, ("focal length", "k1", "k2")
+SMALL = 1e-4
+NOTHING = 1e-13
+
+
+def centre_sigma(tied: TiePoints, free_lenses: bool) -> Floats:
+    """Return the standard uncertainty of each camera's centre (v,), rms of three axes, in the unit of the views.
+
+    It is NaN for cameras that were not placed, and tells how the centres lie against each other: a motion and a growth
+    of all of them together do not count. All tie points are taken to be equally uncertain in the pictures, by as much
+    as they lie off on average, and independent; errors that many of them share are not in it.
+
+    With the points eliminated, U - W V⁻¹ W' is the reduced camera matrix. It has seven motions without stiffness, which
+    the map to the frame of the centres sends to zero, so that any generalised inverse serves.
+
+    Parameters
+    ----------
+    free_lenses : whether focal length and two radial terms of each lens were adjusted too
+
+    Notes
+    -----
+    B. Triggs, P. McLauchlan, R. Hartley, A. Fitzgibbon, "Bundle adjustment: a modern synthesis", 2000, sections 6.1
+    and 9.3.
+    """
+    placed = [(k, view) for k, view in enumerate(tied.views) if view is not None]
+    size, points = POSE + len(LENS) * free_lenses, tied.points
+    weight, squares = np.zeros((len(points), 3, 3)), 0.0
+    reduced = np.zeros((len(placed) * size, len(placed) * size))
+    cross = np.zeros((len(points), len(placed) * size, 3))
+    for row, (k, view) in enumerate(placed):
+        here = tied.view == k
+        which, own = tied.point[here], np.arange(row * size, (row + 1) * size)
+        by_point, by_camera = _slopes(view, points[which], free_lenses)
+        squares += float(((tied.pixels[here] - view.project(points[which])) ** 2).sum())
+        np.add.at(weight, which, np.einsum("nra,nrb->nab", by_point, by_point))
+        reduced[np.ix_(own, own)] = np.einsum("nra,nrb->ab", by_camera, by_camera)
+        np.add.at(cross, (which[:, None], own[None]), np.einsum("nra,nrb->nab", by_camera, by_point))
+    reduced -= np.einsum("pia,pab,pjb->ij", cross, np.linalg.inv(weight), cross, optimize=True)
+    noise = squares / max(2 * len(tied.pixels) - 3 * len(points) - len(reduced) + 7, 1)
+    scale = 1 / np.sqrt(np.diag(reduced))
+    covariance = np.linalg.pinv(reduced * scale * scale[:, None], NOTHING, hermitian=True) * scale * scale[:, None]
+    shifts = (np.arange(len(placed))[:, None] * size + np.arange(3, POSE)).ravel()
+    return _against_each_other(noise * covariance[np.ix_(shifts, shifts)], placed, len(tied.views))
+
+
+def _against_each_other(covariance: Floats, placed: list[tuple[int, View]], count: int) -> Floats:
+    """Return the uncertainties (count,) from the covariance (3 k, 3 k) of the centres in whatever frame."""
+    centres = np.array([view.centre for _, view in placed])
+    away = centres - centres.mean(axis=0)
+    turns = np.cross(np.eye(3)[None], away[:, None]).transpose(0, 2, 1)
+    shifts = np.broadcast_to(np.eye(3), (len(away), 3, 3))
+    common = np.concatenate([turns, shifts, away[:, :, None]], axis=2).reshape(-1, 7)
+    rest = np.eye(len(common)) - common @ np.linalg.pinv(common)
+    variances = np.diag(rest @ covariance @ rest.T).reshape(-1, 3).mean(axis=1)
+    found = np.full(count, np.nan)
+    found[[k for k, _ in placed]] = np.sqrt(variances)
+    return found
+
+
+def _slopes(view: View, points: Floats, free_lens: bool) -> tuple[Floats, Floats]:
+    """Return the slopes of pixels by the points (n, 2, 3), and by turns about the camera, shifts and lens (n, 2, c)."""
+    step = SMALL * float(np.median(view.depth(points)))
+    sides = [view.project(points + step * axis) - view.project(points - step * axis) for axis in np.eye(3)]
+    by_point = np.stack(sides, axis=2) / (2 * step)
+    turned = np.stack([np.cross(axis, points - view.centre) for axis in np.eye(3)], axis=2)
+    columns = [by_point @ turned, by_point]
+    if free_lens:
+        columns.append(np.stack([_by_lens(view, points, number) for number in range(len(LENS))], axis=2))
+    return by_point, np.concatenate(columns, axis=2)
+
+
+def _by_lens(view: View, points: Floats, number: int) -> Floats:
+    """Return the slopes (n, 2) of pixels by the focal length, k1 or k2."""
+    matrix, distortion = view.camera.matrix.copy(), view.camera.distortion.copy()
+    step = SMALL * matrix[0, 0] if number == 0 else SMALL
+    if number == 0:
+        matrix[[0, 1], [0, 1]] += step
+    else:
+        distortion[number - 1] += step
+    changed = replace(view, camera=replace(view.camera, matrix=matrix, distortion=distortion))
+    return (changed.project(points) - view.project(points)) / step

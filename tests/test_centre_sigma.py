@@ -1,0 +1,85 @@
+"""How well the centres of cameras are known against each other, against all unknowns in one dense matrix."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from inspect3d.camera import Camera, View
+from inspect3d.pose import Pose
+from inspect3d.triangulation.centre_sigma import centre_sigma
+from inspect3d.triangulation.tie import TiePoints
+
+VIEWS, POINTS = 4, 40
+
+
+def tied(noise, scale=1.0):
+    """Return tie points before four cameras, seen with noise (px)."""
+    random = np.random.default_rng(1)
+    points = random.uniform(-20, 20, (POINTS, 3))
+    matrix = np.array([[1500.0, 0, 500], [0, 1500, 400], [0, 0, 1]])
+    camera = Camera(matrix, np.array([-0.1, 0.1, 0, 0, 0]), (1000, 800))
+    views = []
+    for k in range(VIEWS):
+        turn = Pose.small(np.array([0.2 * np.sin(2 * k), 0.3 * np.cos(2 * k), 0.1 * k, 0, 0, 0]), np.zeros(3))
+        views.append(View(camera, Pose(np.eye(3), np.array([0.0, 0, 150 + 5 * k])) @ turn))
+    view, point = np.repeat(np.arange(VIEWS), POINTS), np.tile(np.arange(POINTS), VIEWS)
+    pixels = np.concatenate([each.project(points) for each in views]) + random.normal(0, noise, (VIEWS * POINTS, 2))
+    moved = [
+        replace(v, camera_from_cad=Pose(v.camera_from_cad.rotation, scale * v.camera_from_cad.translation))
+        for v in views
+    ]
+    return TiePoints(tuple(moved), scale * points, point, view, pixels, noise)
+
+
+def changed(ties, x, size):
+    """Return views and points after changes of all unknowns: pose and lens of each camera, the points."""
+    views = []
+    for k, view in enumerate(ties.views):
+        own = x[k * size : (k + 1) * size]
+        matrix, distortion = view.camera.matrix.copy(), view.camera.distortion.copy()
+        if size == 9:
+            matrix[[0, 1], [0, 1]] += own[6]
+            distortion[:2] += own[7:]
+        moved = view.camera_from_cad @ Pose.small(own[:6], np.array([1.0, 2.0, 3.0]))
+        views.append(View(replace(view.camera, matrix=matrix, distortion=distortion), moved))
+    return views, ties.points + x[VIEWS * size :].reshape(-1, 3)
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_centres_are_known_as_the_inverse_of_the_whole_normal_matrix_says(free):
+    ties, size = tied(0.2), 9 if free else 6
+    steps = np.concatenate(
+        [np.tile([1e-5] * 3 + [1e-3] * 3 + ([1e-1, 1e-4, 1e-4] if free else []), VIEWS), [1e-3] * 3 * POINTS]
+    )
+
+    def pixels(x):
+        views, points = changed(ties, x, size)
+        return np.concatenate([view.project(points) for view in views]).ravel()
+
+    def centres(x):
+        return np.concatenate([view.centre for view in changed(ties, x, size)[0]])
+
+    both = [(pixels(e) - pixels(-e), centres(e) - centres(-e)) for e in np.diag(steps)]
+    slopes, moves = (np.stack(columns, axis=1) / 2 for columns in zip(*both, strict=True))
+    misses = ties.pixels.ravel() - pixels(np.zeros(len(steps)))
+    noise = misses @ misses / (len(misses) - len(steps) + 7)
+    covariance = noise * moves @ np.linalg.pinv(slopes.T @ slopes, 1e-14, hermitian=True) @ moves.T
+    away = np.array([view.centre for view in ties.views])
+    away -= away.mean(axis=0)
+    together = [np.cross(axis, away).ravel() for axis in np.eye(3)] + [np.tile(axis, VIEWS) for axis in np.eye(3)]
+    basis = np.linalg.qr(np.stack([*together, away.ravel()], axis=1))[0]
+    rest = np.eye(3 * VIEWS) - basis @ basis.T
+    expected = np.sqrt(np.diag(rest @ covariance @ rest).reshape(-1, 3).mean(axis=1))
+    assert centre_sigma(ties, free) == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_uncertainty_grows_with_the_unit_and_cameras_that_were_not_placed_have_none():
+    one, ten = tied(0.2), tied(0.2, 10.0)
+    assert centre_sigma(ten, True) == pytest.approx(10 * centre_sigma(one, True), rel=1e-4)
+    fewer = replace(one, views=(*one.views[:3], None))
+    kept = fewer.view < 3
+    fewer = replace(fewer, point=one.point[kept], view=one.view[kept], pixels=one.pixels[kept])
+    assert np.isnan(centre_sigma(fewer, False)).tolist() == [False, False, False, True]
