@@ -12,9 +12,9 @@ from scipy.spatial import cKDTree
 from inspect3d.arrays import Booleans, Floats
 from inspect3d.camera import Camera, View
 from inspect3d.correlation.picture import Pictures
-from inspect3d.files.calibration import Rig
+from inspect3d.files.calibration import Rig, what_is_known
 from inspect3d.files.calibration_load import load_calibration
-from inspect3d.files.photograph import Photograph, read_mask, read_photograph
+from inspect3d.files.photograph import Photograph, of_turned, read_mask, read_photograph
 from inspect3d.measure import Cloud, Files, Measurement
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import InputError, MeasurementError
@@ -56,15 +56,8 @@ class ColmapSource:
         listed = ", ".join(names if len(names) <= 4 else [*names[:2], "...", names[-1]])
         return (
             f"{len(names)} photographs of {', '.join(f'{width} x {height}' for width, height in sizes)} px ({listed}), "
-            f"cameras {self._known()}"
+            f"cameras {what_is_known(self.rig)}"
         )
-
-    def _known(self) -> str:
-        if self.rig is None:
-            return "not calibrated"
-        if self.rig.camera_from_cad:
-            return "calibrated, in their places before the part"
-        return "calibrated, in their places in the rig" if self.rig.camera_from_rig else "of calibrated lenses"
 
 
 @dataclass(frozen=True)
@@ -125,11 +118,7 @@ class Colmap:
         calibration = files.paths.get("cameras", ())
         rig = load_calibration(calibration, names, sizes) if calibration else None
         self._require_marked(names)
-        remarks = [
-            f"{photograph.name} asks viewers to turn it; its pixels are counted as it is stored, unturned."
-            for photograph in photographs
-            if photograph.turned
-        ]
+        remarks = [*of_turned(photographs)]
         if rig is None and len(set(sizes)) > 1:
             remarks.append("The photographs have different sizes: each is taken as that of a camera of its own.")
         return ColmapSource(photographs, masks, rig, tuple(remarks))

@@ -17,9 +17,9 @@ from inspect3d.correlation.solver import Step
 from inspect3d.correlation.start import StereoStart
 from inspect3d.correlation.uncertainty import Systematic
 from inspect3d.correlation.words import contributions, remarks
-from inspect3d.files.calibration import Rig
+from inspect3d.files.calibration import Rig, what_is_known
 from inspect3d.files.calibration_load import load_calibration
-from inspect3d.files.photograph import Photograph, read_mask, read_photograph
+from inspect3d.files.photograph import Photograph, of_turned, read_mask, read_photograph
 from inspect3d.measure import Files, NodalMeasurement
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import InputError
@@ -50,14 +50,7 @@ class StereoSource:
     def __str__(self) -> str:
         names = ", ".join(photograph.name for photograph in self.photographs)
         width, height = self.photographs[0].size
-        return f"{len(self.photographs)} pictures of {width} x {height} px ({names}), cameras {self._known()}"
-
-    def _known(self) -> str:
-        if self.rig is None:
-            return "not calibrated"
-        if self.rig.camera_from_cad:
-            return "calibrated, in their places before the part"
-        return "calibrated, in their places in the rig" if self.rig.camera_from_rig else "of calibrated lenses"
+        return f"{len(self.photographs)} pictures of {width} x {height} px ({names}), cameras {what_is_known(self.rig)}"
 
 
 @dataclass(frozen=True)
@@ -117,12 +110,7 @@ class Stereo:
         rig = load_calibration(calibration, tuple(p.name for p in photographs), sizes) if calibration else None
         self._require_start(rig)
         self._require_focal(rig, photographs)
-        remarks = tuple(
-            f"{photograph.name} asks viewers to turn it; its pixels are counted as it is stored, unturned."
-            for photograph in photographs
-            if photograph.turned
-        )
-        return StereoSource(photographs, masks, rig, remarks)
+        return StereoSource(photographs, masks, rig, of_turned(photographs))
 
     def correlate(self, nominal: Nominal) -> Correlate:
         """Return the settings of the correlation, for nodes that move by themselves."""

@@ -76,3 +76,12 @@ class Rig:
         if self.camera_from_cad is None:
             raise ValueError("the places of the cameras before the part are unknown")
         return tuple(map(View, self.cameras, self.camera_from_cad))
+
+
+def what_is_known(rig: Rig | None) -> str:
+    """Return what a calibration tells about the cameras, for a line that names them; None: there is no calibration."""
+    if rig is None:
+        return "not calibrated"
+    if rig.camera_from_cad:
+        return "calibrated, in their places before the part"
+    return "calibrated, in their places in the rig" if rig.camera_from_rig else "of calibrated lenses"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -67,6 +68,15 @@ def read_photograph(path: Path) -> Photograph:
         )
     focal, turned = _exif(path, max(grey.shape))
     return Photograph(path.name, grey, white, focal, turned)
+
+
+def of_turned(photographs: Sequence[Photograph]) -> tuple[str, ...]:
+    """Return what to say of photographs that ask viewers to turn them, a sentence each."""
+    return tuple(
+        f"{photograph.name} asks viewers to turn it; its pixels are counted as it is stored, unturned."
+        for photograph in photographs
+        if photograph.turned
+    )
 
 
 def read_mask(path: Path, size: tuple[int, int]) -> Booleans:

@@ -48,7 +48,7 @@ def front(record: Record, accounts: Sequence[Account], agreement: Sequence[Block
     head = ("Measurement", "Method", "Result", *FIGURES)
     blocks.append(Table(head, tuple(_row(each) for each in accounts), tuple(columns)))
     for each in accounts:
-        words = [each.verdict] if each.verdict else []
+        words = [each.verdict] if each.verdict and each.verdict != verdict.words else []
         words += [each.part.status.words] if each.row and each.part.status is not Status.OK else []
         words += [each.part.reason] if not each.row else []
         blocks += [Paragraph(" ".join(words), f"{each.part.name}:")] if words else []
