@@ -92,6 +92,21 @@ def test_faces_of_real_files_evaluate_to_the_points_of_their_b_rep(name):
     assert max(worst_gap(part, number, random) for number in numbers) < 1e-6
 
 
+@pytest.mark.data
+@pytest.mark.parametrize("name", ["bladex_lower.iges", "pythonocc_surf114.igs"])
+def test_edges_of_real_files_lie_on_their_faces_within_the_tolerance_of_the_model(name):
+    if not DATA.exists():
+        pytest.skip("the real data are not beside the repository")
+    part = read_brep(DATA / name)
+    faces = {number: nurbs_of(part, number) for number in range(1, len(part.faces) + 1)}
+    for curve, numbers, tolerance in zip(part.curves, part.edge_faces, part.edge_tolerance, strict=True):
+        at = np.linspace(curve.FirstParameter(), curve.LastParameter(), 7)
+        points = np.array([curve.Value(t).Coord() for t in at.tolist()])
+        for number in numbers:
+            feet = faces[number].points(faces[number].parameters(points))
+            assert np.linalg.norm(feet - points, axis=1).max() < tolerance
+
+
 def soup(count=40):
     """Return tetrahedra that hang together nowhere, 3 (4 n) corners (12 n, 3) mm."""
     random = np.random.default_rng(0)

@@ -14,6 +14,7 @@ from inspect3d.pose import Pose
 
 STEPS, ARRIVED = 30, 1e-10  # mm
 AROUND = 8  # places near a point to start from where it ends at the rim
+MARGIN = 1e-4  # share of the parameters that still counts as the rim
 PLACES = 6  # along each direction of a span between knots, to start the search for a point from
 
 
@@ -113,12 +114,13 @@ class Nurbs:
         """Return the (u, v) (n, 2) of the closest points of the surface to points (n, 3) mm near it.
 
         Gauss-Newton from the nearest of many places all over the surface; a step that would leave it ends at its rim.
-        What ends there may belong beyond a seam, and is sought from other places near by as well.
+        What ends there, or nearly so, may belong beyond a seam, and is sought from other places near by as well.
         """
         tree, places = self._places
         uv = self.descended(points, places[tree.query(points)[1]])
         low, high = self.bounds
-        at_rim = np.flatnonzero(((uv <= low) | (uv >= high)).any(axis=1))
+        margin = MARGIN * (high - low)
+        at_rim = np.flatnonzero(((uv <= low + margin) | (uv >= high - margin)).any(axis=1))
         distance = np.linalg.norm(self.points(uv[at_rim]) - points[at_rim], axis=1)
         _, nearest = tree.query(points[at_rim], k=min(AROUND, len(places)))
         for other in nearest.T[1:]:
@@ -138,14 +140,14 @@ class Nurbs:
 
     @cached_property
     def _places(self) -> tuple[Any, Floats]:
-        """Return a tree of places all over the surface, and their parameters."""
+        """Return a tree of places all over the surface, its rim and corners among them, and their parameters."""
         from scipy.spatial import cKDTree
 
         shares = (np.arange(PLACES) + 0.5) / PLACES
         rows = []
         for knots in (self.knots_u, self.knots_v):
             distinct = np.unique(knots)
-            rows.append((distinct[:-1, None] + np.diff(distinct)[:, None] * shares).ravel())
+            rows.append(np.append(distinct, distinct[:-1, None] + np.diff(distinct)[:, None] * shares))
         uv = np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1).reshape(-1, 2)
         return cKDTree(self.points(uv)), uv
 

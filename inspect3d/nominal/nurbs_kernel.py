@@ -160,7 +160,12 @@ def descend(net: Net, p: int, q: int, points: Floats, steps: int, arrived: float
                 if e * g - f * f > 0:
                     step_u = (g * right_u - f * right_v) / (e * g - f * f)
                     step_v = (e * right_v - f * right_u) / (e * g - f * f)
-                u, v = min(max(uv[n, 0] + step_u, low_u), high_u), min(max(uv[n, 1] + step_v, low_v), high_v)
+                u = min(max(uv[n, 0] + step_u, low_u), high_u)
+                if u != uv[n, 0] + step_u and g > 0:  # along the rim, as far as is best there
+                    step_v = (right_v - f * (u - uv[n, 0])) / g
+                v = min(max(uv[n, 1] + step_v, low_v), high_v)
+                if v != uv[n, 1] + step_v and e > 0:
+                    u = min(max(uv[n, 0] + (right_u - f * (v - uv[n, 1])) / e, low_u), high_u)
                 length = np.sqrt(e) * abs(u - uv[n, 0]) + np.sqrt(g) * abs(v - uv[n, 1])
                 uv[n, 0], uv[n, 1] = u, v
                 if length <= arrived:
