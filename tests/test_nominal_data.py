@@ -45,10 +45,13 @@ MESHES = [
 ]
 
 
+read = cache(read_brep)
+
+
 @cache
 def meshed(path: Path, elements: int = 25) -> tuple[Brep, InspectionMesh]:
     """Return the part and an inspection mesh of so many elements on its diagonal: 25 are quick, 60 the default."""
-    part = read_brep(path)
+    part = read(path)
     size = part.diagonal / elements
     return part, mesh_on_brep(tessellated(part, size / 50), size)[0]
 

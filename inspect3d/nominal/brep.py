@@ -121,16 +121,27 @@ class Brep:
 
     def inside(self, face: Integers, uv: Floats) -> Booleans:
         """Tell which parameters (n, 2) lie within the trimmed region of their face, its border included."""
-        from OCP.BRepTopAdaptor import BRepTopAdaptor_FClass2d
         from OCP.gp import gp_Pnt2d
         from OCP.TopAbs import TopAbs_State
 
         within = np.zeros(len(uv), dtype=bool)
         for number, members in _groups(face):
-            region = BRepTopAdaptor_FClass2d(self.faces[number - 1], 1e-9)
+            region = self._region(number)
             states = [region.Perform(gp_Pnt2d(u, v)) for u, v in uv[members].tolist()]
             within[members] = [state != TopAbs_State.TopAbs_OUT for state in states]
         return within
+
+    def _region(self, number: int) -> Any:
+        """Return what tells the inside of a face, made once: that takes longer than asking it."""
+        from OCP.BRepTopAdaptor import BRepTopAdaptor_FClass2d
+
+        if number not in self._regions:
+            self._regions[number] = BRepTopAdaptor_FClass2d(self.faces[number - 1], 1e-9)
+        return self._regions[number]
+
+    @cached_property
+    def _regions(self) -> dict[int, Any]:
+        return {}
 
     def clearly_inside(self, face: Integers, uv: Floats) -> Booleans:
         """Tell which parameters (n, 2) lie within the trimmed region of their face, off its border; slower, surer."""
