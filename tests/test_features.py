@@ -171,3 +171,12 @@ def test_a_bump_and_a_dent_are_two_regions_with_their_area_height_and_place():
 def test_noise_alone_makes_no_region():
     noise = np.random.default_rng(6).normal(0, SIGMA, len(MESH))
     assert not Segmentation()(*mapped(noise), MESH)
+
+
+def test_of_many_regions_those_with_most_material_are_told():
+    noise = mapped(np.random.default_rng(6).normal(0, SIGMA, len(MESH)))
+    few, every = (Segmentation(stands_out=0.5, certain=0.1, most=most)(*noise, MESH) for most in (5, 1000))
+    volumes = [abs(region.mean) * region.area for region in every]
+    assert len(every) > 10
+    assert volumes == sorted(volumes, reverse=True)
+    assert [region.mean for region in few] == [region.mean for region in every[:5]]

@@ -47,13 +47,16 @@ class Segmentation:
         sides = sides[(sign[sides[:, 0]] == sign[sides[:, 1]]) & (sign[sides[:, 0]] != 0)]
         graph = sparse.csr_matrix((np.ones(len(sides)), sides.T), (len(mesh), len(mesh)))
         label = sparse.csgraph.connected_components(graph, directed=False)[1][at]
-        names, count = np.unique(label[out], return_counts=True)
+        members = np.flatnonzero(out)
+        _, name, count = np.unique(label[members], return_inverse=True, return_counts=True)
+        areas = mesh.areas[at]
+        volume = np.abs(np.bincount(name, value[members] * areas[members], minlength=len(count)))
+        large = np.flatnonzero(count >= self.least)
         found, whole = [], _whole(covariance)
-        for name in names[count >= self.least]:
-            part = np.flatnonzero((label == name) & out)
-            region = region_of(part, value, whole, mesh.nodes[at], mesh.areas[at], None)
+        for k in large[np.argsort(-volume[large], kind="stable")][: self.most]:
+            region = region_of(members[name == k], value, whole, mesh.nodes[at], areas, None)
             found.append(replace(region, nodes=at[region.nodes]))
-        return tuple(sorted(found, key=lambda region: -abs(region.mean) * region.area)[: self.most])
+        return tuple(found)
 
 
 def _whole(covariance: MapCovariance) -> DifferenceCovariance:
