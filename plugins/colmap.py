@@ -108,6 +108,7 @@ class Colmap:
         """
         photographs = tuple(read_photograph(path) for path in files["images"])
         self._require_different(photographs)
+        self._focals(photographs)
         masks: tuple[Booleans | None, ...] = (None,) * len(photographs)
         given = files.paths.get("masks", ())
         if given:
@@ -169,7 +170,7 @@ class Colmap:
         """Return the focal length to begin with of each photograph, px."""
         given = self.focal if isinstance(self.focal, tuple) else (self.focal,) * len(photographs)
         if len(given) != len(photographs):
-            raise MeasurementError(
+            raise InputError(
                 f"focal names {len(given)} values for {len(photographs)} photographs: give one for all, or one each."
             )
         return [

@@ -162,6 +162,11 @@ def test_one_photograph_is_too_few(folder):
         Colmap().open(files(folder, NAMES[:1]))
 
 
+def test_focal_lengths_for_other_photographs_are_refused_before_measuring(folder):
+    with pytest.raises(InputError, match="focal names 2 values for 5 photographs"):
+        Colmap(focal=(2050.0, 2050.0)).open(files(folder))
+
+
 def test_the_same_photograph_twice_is_refused(folder, tmp_path):
     (tmp_path / "copy.png").write_bytes((folder / NAMES[0]).read_bytes())
     paths = (folder / NAMES[0], tmp_path / "copy.png")
