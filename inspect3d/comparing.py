@@ -73,7 +73,13 @@ def compare_runs(folders: Sequence[Path], out: Path, progress: Progress | None =
 
 
 def joined(folders: Sequence[Path]) -> Record:
-    """Return finished inspections as one, their maps compared; see `compare_runs`."""
+    """Return finished inspections as one, their maps compared; see `compare_runs`.
+
+    Raises
+    ------
+    InputError
+        A folder holds no inspection, none has a map, or they are of different parts or meshes.
+    """
     finished = [open_results(folder) for folder in folders]
     names = _names(finished)
     runs = [_run(each, own) for each, own in zip(finished, names, strict=True)]

@@ -265,6 +265,8 @@ MATRIX = '"matrix": [[900, 0, 5], [0, 900, 5], [0, 0, 1]]'
         (ONE.format("{" + MATRIX + ', "sigma": {"f": 1}}'), "sigma is a table"),
         (ONE.format("{" + MATRIX + ', "sigma": {"focal": -1}}'), "not negative"),
         (ONE.format("{" + MATRIX + ', "camera_from_cad": [[1]]}'), "pose matrix"),
+        (ONE.format('{"matrix": [[1' + "0" * 400 + ", 0, 5], [0, 9, 5], [0, 0, 1]]}"), "too large"),
+        ('{"a":' * 100_000, "no calibration that inspect3d reads"),
         (DICE.format(fx="many", key="K2", value="0"), "FX"),
         (DICE.format(fx="0", key="K2", value="0"), "focal length is positive"),
         (DICE.format(fx="9", key="K4", value="1"), "K4"),

@@ -14,29 +14,41 @@ Sizes = tuple[tuple[int, int], ...]
 
 
 def checked_camera(matrix: ArrayLike, distortion: ArrayLike, size: tuple[int, int], where: str) -> Camera:
-    """Return a camera, or say in which place of which file its numbers are wrong."""
+    """Return a camera.
+
+    Raises
+    ------
+    InputError
+        Its numbers are wrong; the sentence says in which place of which file, `where`.
+    """
     try:
         return Camera(np.array(matrix, float), np.array(distortion, float), size)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{where}: {error}.") from error
 
 
 def checked_pose(rotation: ArrayLike, translation: ArrayLike, where: str) -> Pose:
-    """Return a pose, or say in which place of which file its numbers are wrong."""
+    """Return a pose.
+
+    Raises
+    ------
+    InputError
+        Its numbers are wrong; the sentence says in which place of which file, `where`.
+    """
     try:
         return Pose(np.array(rotation, float), np.array(translation, float))
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{where}: {error}.") from error
 
 
 def require_one_each(found: int, pictures: int, name: str) -> None:
-    """Refuse a file that has not one camera per picture."""
+    """Refuse a file that has not one camera per picture, with an `InputError`."""
     if found != pictures:
         raise InputError(f"{name} holds {found} cameras, and the recipe names {pictures} pictures: give one for each.")
 
 
 def require_size(stated: tuple[int, int], size: tuple[int, int], where: str) -> None:
-    """Refuse a camera that was calibrated for pictures of another size, width and height in px."""
+    """Refuse a camera calibrated for pictures of another size, width and height in px, by an `InputError`."""
     if stated != size:
         raise InputError(
             f"{where} belongs to pictures of {stated[0]} x {stated[1]} px, and this one has {size[0]} x {size[1]} px."

@@ -98,7 +98,7 @@ def _camera(entry: Any, size: tuple[int, int], where: str) -> Camera:
     try:
         width, height = entry.get("size", size)
         matrix, distortion = (np.array(entry.get(key, default), float) for key, default in DEFAULTS)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{where}: {error}.") from error
     require_size((width, height), size, where)
     return checked_camera(matrix, distortion, size, where)
@@ -111,7 +111,7 @@ def _poses(entries: list[Any], key: str, name: str) -> tuple[Pose, ...] | None:
     for k, entry in enumerate(entries, 1):
         try:
             poses.append(Pose.from_matrix(np.array(entry[key], float)))
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise InputError(f"{name}, camera {k}, {key}: {error}.") from error
     return tuple(poses)
 
@@ -127,5 +127,5 @@ def _sigma(content: Any, where: str) -> CameraSigma | None:
         )
         distortion = np.array(content.get("distortion", [0.0] * 5), float)
         return CameraSigma(focal, centre, distortion, rotation, translation)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{where}, sigma: {error}.") from error

@@ -46,7 +46,13 @@ def read_brep(path: Path) -> Brep:
 
 
 def brep_of(shape: Any, faces: list[Any]) -> Brep:
-    """Return the faces of a `TopoDS_Shape` in mm, numbered as they come, and its edges."""
+    """Return the faces of a `TopoDS_Shape` in mm, numbered as they come, and its edges.
+
+    Raises
+    ------
+    InputError
+        An edge lies infinitely far from its faces.
+    """
     from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopExp import TopExp
