@@ -4,6 +4,7 @@
     python benchmarks/isogeometric.py step                height of a step, inside a face and along a border of faces
     python benchmarks/isogeometric.py sigma --seeds 12    is sigma true, inside the space of the splines and outside?
     python benchmarks/isogeometric.py sigma --where inside --cases lenses self
+    python benchmarks/isogeometric.py speed --seeds 7     CPU time of the study against the mesh's, both in one process
     python benchmarks/isogeometric.py faces FOLDER        the faces of STEP and IGES files against their B-rep
 
 Lengths are in µm, times are CPU seconds of the correlation alone. z is error over sigma, cover the share within 1.96;
@@ -50,11 +51,12 @@ METHODS = {
     "halved twice": Correlate(pixels=PIXELS, splines=Splines(refine=2)),
     "CAD's knots, apart": Correlate(pixels=PIXELS, splines=Splines(continuity=0.0)),
 }
+SPED = ("CAD's knots", "nodes")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("study", "step", "sigma", "faces"))
+    parser.add_argument("what", choices=("study", "step", "sigma", "speed", "faces"))
     parser.add_argument("folder", nargs="?", type=Path, help="of STEP and IGES files")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--full", action="store_true", help="5 megapixels in place of a quarter of that")
@@ -65,7 +67,7 @@ def main() -> None:
     if chosen.what == "faces":
         _faces(chosen.folder)
         return
-    {"study": _study, "step": _step, "sigma": _sigma}[chosen.what](chosen)
+    {"study": _study, "step": _step, "sigma": _sigma, "speed": _speed}[chosen.what](chosen)
 
 
 def _study(chosen: argparse.Namespace) -> None:
@@ -91,6 +93,17 @@ def _study(chosen: argparse.Namespace) -> None:
             k, *lengths, z, start, end, seconds = np.mean(found, axis=0)
             words = " ".join(f"{1e3 * value:8.2f}" for value in lengths)
             print(f"{name:14s} {k:9.0f}  {words} {z:6.2f} {start:10.1f} {end:9.1f} {seconds:8.1f}", flush=True)
+
+
+def _speed(chosen: argparse.Namespace) -> None:
+    """Take turns on the same pictures; the first turn only loads compiled code."""
+    setup = Setup("smooth", full=chosen.full, element=chosen.element)
+    for case in chosen.cases:
+        trial = next(setup.trials(CASES[case], range(1)))
+        turns = [[_measured(METHODS[name], trial)[1] for name in SPED] for _ in range(1 + chosen.seeds)][1:]
+        spent, ratio = np.median(turns, axis=0), np.median([splines / nodes for splines, nodes in turns])
+        words = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in zip(SPED, spent, strict=True))
+        print(f"cameras {case}: {words} of CPU time, ratio {ratio:.2f} (medians of {len(turns)})", flush=True)
 
 
 def _step(chosen: argparse.Namespace) -> None:

@@ -13,12 +13,12 @@ from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
 from inspect3d.correlation.lack_of_fit import LackOfFit, lack_of_fit
+from inspect3d.correlation.linear import slides_of, system_of
 from inspect3d.correlation.misfit import Misfit, unresolved
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.parting import parting
 from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.spline_space import SplineSpace
-from inspect3d.correlation.system import System
 
 MOST = 0.5  # share of the nodes of a face that are missed, from which on all of them are
 FEWEST, MOSTLY = 3, 0.5  # nodes that prove a step, and their share of those that prove any error, at the least
@@ -66,7 +66,6 @@ def model_error(
     columns: Integers,
     lack: LackOfFit,
     summed: Misfit,
-    system: System,
     noise: float,
     motion: Floats,
 ) -> ModelError:
@@ -81,16 +80,18 @@ def model_error(
     ----------
     found : what the pictures say about the facets at the solution, by `columns` and in the power 2
     weights : (f,) of the facets
+    freedom : of cameras that are held
     lack, summed : of the nodes by themselves
-    system : of the solution
     noise : variance of the residuals, correlated as they are, grey levels²
     motion : (k,) mm, the solution
     """
     space = scene.space
     assert isinstance(space, SplineSpace)
-    within, rows, times = system, space.rows(scene), noise / lack.noise
+    scale, slides = freedom.scale(views, scene.sample), slides_of(scene, freedom, views)
+    within = system_of(scene, found, weights * found.clean**2, noise, freedom, columns, scale, slides)
+    rows, times = space.rows(scene), noise / lack.noise
     gaps = np.zeros(len(scene.nodes))
-    plain, sign = system.variances(rows), np.ones(len(scene.nodes))
+    plain, sign = within.variances(rows), np.ones(len(scene.nodes))
     parted = parting(scene, found, views, weights, freedom, columns, noise)
     if parted is not None:
         gaps, sign = parted.squared(plain), np.sign(parted.motion)

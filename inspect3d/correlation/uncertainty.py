@@ -19,6 +19,7 @@ from inspect3d.correlation.model_error import ModelError, model_error
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.smoothing import Smoothing
+from inspect3d.correlation.solver import held
 from inspect3d.correlation.system import System
 
 SHIFT_X, SHIFT_Y = 8, 9
@@ -128,7 +129,9 @@ def uncertainty(
     The curvature H₀ = c A, with c the clean share of each facet's curvature A, is that of noiseless gradients; the
     estimate H₀⁻¹ J'W e has the covariance H₀⁻¹ A H₀⁻¹ = (c² A)⁻¹ for independent noise of the variance
     v = sum w r² / (degrees of freedom), and κ times that for residuals that are not. Where the elements do not fit, as
-    at a step, residuals count for neither; the nodes there have an uncertainty of their own; see `misfit`.
+    at a step, residuals count for neither; the nodes there have an uncertainty of their own; see `misfit`. What splines
+    miss is looked for with the cameras where they were found: nodes that are free would take cameras, of which the
+    pictures tell little, far away with them.
 
     Parameters
     ----------
@@ -144,9 +147,11 @@ def uncertainty(
     factors = weights * found.clean**2
     scale, slides = freedom.scale(views, scene.sample), slides_of(scene, freedom, views)
     free, left, before = scene, found, noise
+    still = held(freedom)
     if scene.space.confined:
-        lack = lack_of_fit(scene, found, views, weights, freedom, columns)
+        lack = lack_of_fit(scene, found, views, weights, still, columns)
         free, left, before, first = lack.scene, lack.left, lack.noise, lack.system
+        mixing = still.spread(columns)[0]
     else:
         first = system_of(scene, found, factors, noise, freedom, columns, scale, slides)
     summed = misfit(free, left, weights / before, first, mixing)
@@ -156,13 +161,13 @@ def uncertainty(
     system = system_of(scene, found, factors, total, freedom, columns, scale, slides)
     rough, model = np.zeros(len(scene.nodes)), None
     if scene.space.confined:
-        model = model_error(scene, found, views, weights, freedom, columns, lack, summed, system, total, motion)
+        model = model_error(scene, found, views, weights, still, columns, lack, summed, total, motion)
     else:
         rough = unresolved(scene, left, total, summed.fitted)
     shifts = np.zeros((len(system.cross), 0))
     if systematic is not None:
         shares = weights * found.clean / total
-        shifts = _shifts(scene, found, shares, system, mixing, columns, systematic)
+        shifts = _shifts(scene, found, shares, system, freedom.spread(columns)[0], columns, systematic)
     smoother = scene.space.smoother(scene, weights)
     return Uncertainty(system, shifts, smoother, rough, noise, summed.correlated, model=model)
 
