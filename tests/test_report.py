@@ -24,6 +24,7 @@ from inspect3d.recipe import Label, Recipe
 from inspect3d.record import InputFile, MeasuredPart, Record
 from inspect3d.register.alignment import Alignment, Candidate, FreeMotion
 from inspect3d.report.bands import bands
+from inspect3d.report.finished import open_results
 from inspect3d.report.reading import readings
 from inspect3d.report.results import as_json, results, verdict_shares
 from inspect3d.report.screenshot import screenshot
@@ -271,3 +272,22 @@ def test_a_screenshot_of_something_else_is_refused(tmp_path):
         screenshot(tmp_path, tmp_path / "a.png")
     with pytest.raises(InputError, match=r"\.png"):
         screenshot(tmp_path, tmp_path / "a.jpg")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda values: values.clear(),
+        lambda values: values.pop("inputs"),
+        lambda values: values["part"].pop("bounds"),
+        lambda values: values.update(measurements=[]),
+        lambda values: values["measurements"].update({"../b": next(iter(values["measurements"].values()))}),
+        lambda values: next(iter(values["measurements"].values())).update(status="fine"),
+    ],
+)
+def test_results_of_another_version_or_program_are_refused(out, tmp_path, change):
+    values = json.loads((out / "results.json").read_text("utf-8"))
+    change(values)
+    (tmp_path / "results.json").write_text(json.dumps(values), "utf-8")
+    with pytest.raises(InputError, match="of another version of inspect3d: run it again"):
+        open_results(tmp_path)

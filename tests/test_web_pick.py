@@ -80,7 +80,9 @@ def cloud(photographs, tmp_path) -> tuple[Path, np.ndarray, Pose]:
     ]
     ended = {"status": "ambiguous", "reason": "Two poses <fit>.", "alignment": {"candidates": candidates}}
     (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "results.json").write_text(json.dumps({"measurements": {"laser": ended}}), "utf-8")
+    part = {"name": "Block", "cad": "part.step", "tolerance": None, "bounds": [[0, 0, 0], [1, 1, 1]]}
+    values = {"part": part, "inputs": [], "measurements": {"laser": {"method": "scan", **ended}}}
+    (tmp_path / "out" / "results.json").write_text(json.dumps(values), "utf-8")
     return tmp_path / "recipe.toml", points, cad_from_scan
 
 

@@ -119,13 +119,33 @@ def open_results(folder: Path) -> Finished:
     Raises
     ------
     InputError
-        The folder holds no inspection.
+        The folder holds no inspection, or one of another version.
     """
     try:
         values = json.loads((folder / "results.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         raise InputError(f"{folder} holds no inspection: name the folder that `inspect3d run` wrote.") from None
+    if not _is_complete(values):
+        raise InputError(f"{folder} holds an inspection of another version of inspect3d: run it again.")
     return Finished(folder, values)
+
+
+def _is_complete(values: Any) -> bool:
+    """Tell whether results.json says what everything that reads finished inspections asks of it."""
+    try:
+        part, inputs, measurements = values["part"], values["inputs"], values["measurements"]
+        np.array(part["bounds"], dtype=np.float64).reshape(2, 3)
+        for name, each in measurements.items():
+            file_name(name)
+            Status(each["status"])
+        listed = all(isinstance(each["path"], str) for each in inputs)
+        return (
+            listed
+            and {"name", "cad", "tolerance"} <= part.keys()
+            and all({"method", "reason"} <= each.keys() for each in measurements.values())
+        )
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return False
 
 
 def _read(file: Path, name: str) -> FinishedMap:

@@ -245,9 +245,10 @@ def _takes_landmarks(table: MeasurementTable) -> bool:
 
 def _job(recipe: Recipe, table: MeasurementTable, nominal: Nominal, out: Path) -> Job:
     source = (Pictured if table.listed("images") else Clouded).of(recipe, table, nominal)
-    if not (out / "results.json").is_file():
+    try:
+        ended = open_results(out).values["measurements"].get(table.name)
+    except InputError:  # there was no run yet, or one of another version: no candidates to choose from
         return Job(table, source)
-    ended = open_results(out).values["measurements"].get(table.name)
     if ended is None or ended["status"] != Status.AMBIGUOUS:
         return Job(table, source)
     return Job(table, source, tuple(ended["alignment"]["candidates"]), ended["reason"])
