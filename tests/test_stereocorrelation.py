@@ -245,7 +245,7 @@ def test_pictures_of_different_parts_are_refused(tmp_path, folder, views):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     photographs(tmp_path, views, pattern=7)
     (tmp_path / "left.png").write_bytes((folder / "left.png").read_bytes())
-    assert "check that the pictures show this part" in failed(tmp_path, 'cameras = "placed.json"\n')
+    assert "show this part with its speckle" in failed(tmp_path, 'cameras = "placed.json"\n')
 
 
 def test_a_part_that_turns_its_back_is_refused(folder):
