@@ -28,7 +28,7 @@ from inspect3d.arrays import Booleans, Floats
 from inspect3d.correlation.correlate import Correlate
 from inspect3d.correlation.picture import Pictures
 from inspect3d.correlation.shape import Shape
-from inspect3d.correlation.uncertainty import Systematic
+from inspect3d.correlation.systematic import Systematic
 
 HEAD = (
     "case         seeds |   e raw  sigma  z raw | weak of mean (99 %)  | e rest  sigma     max | z rest  cover |"

@@ -10,7 +10,7 @@ import pytest
 from inspect3d.camera import View
 from inspect3d.correlation.correlate import JOINT, SHAPE, TWO_STEPS, Correlate
 from inspect3d.correlation.freedom import Freedom, Lens
-from inspect3d.correlation.uncertainty import Systematic
+from inspect3d.correlation.systematic import Systematic
 from inspect3d.outcome import MeasurementError
 from inspect3d.pose import Pose
 from tests.sheets import plane, plane_normals, sheet

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from inspect3d.correlation.disagreement import at_least, disagreement
+from inspect3d.correlation.disagreement import disagreement
 from inspect3d.correlation.freedom import Freedom, Lens, Stand
 from inspect3d.correlation.picture import Pictures
 from inspect3d.correlation.scene import scene
+from inspect3d.correlation.systematic import Systematic
 from inspect3d.correlation.texture import speckle_size
-from inspect3d.correlation.uncertainty import Systematic
 from tests.sheets import sheet
 from tests.speckled import Speckle, photographed, picture, rig
 
@@ -58,9 +58,9 @@ def test_a_stated_shift_is_not_made_larger_by_chance(length):
     random = np.random.default_rng(0)
     fields = (vectors * np.sqrt(np.maximum(values, 0))) @ random.normal(size=(len(values), 3000))
     sizes = stated.size * np.sqrt((fields**2).mean(axis=0))
-    larger = np.mean([at_least(stated, size, seen).size > stated.size for size in sizes])
+    larger = np.mean([stated.at_least(size, seen).size > stated.size for size in sizes])
     assert 0.002 < larger < 0.03
-    assert at_least(stated, 4 * stated.size, seen).size == 4 * stated.size
+    assert stated.at_least(4 * stated.size, seen).size == 4 * stated.size
 
 
 def test_the_stands_of_a_rig_that_move_as_one_move_the_part():

@@ -10,18 +10,20 @@ import numpy as np
 
 from inspect3d.arrays import Booleans, Floats
 from inspect3d.camera import View
-from inspect3d.correlation.disagreement import at_least, disagreement
+from inspect3d.correlation.disagreement import disagreement
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.hidden import hidden_motions
 from inspect3d.correlation.normal import Facets, facets
 from inspect3d.correlation.picture import Interpolation, Pictures
 from inspect3d.correlation.scene import Scene, scene
 from inspect3d.correlation.shape import Shape
+from inspect3d.correlation.shift import needed_columns
 from inspect3d.correlation.solver import COARSE, ON_NOMINAL, Level, Solver, State, Step, held
 from inspect3d.correlation.splines import Splines
 from inspect3d.correlation.still import in_gauge
+from inspect3d.correlation.systematic import Systematic
 from inspect3d.correlation.texture import speckle_size
-from inspect3d.correlation.uncertainty import Systematic, needed_columns, uncertainty
+from inspect3d.correlation.uncertainty import uncertainty
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
 
@@ -110,12 +112,13 @@ class Correlate:
         state = Solver(calibrating, COARSE)(seen, pictures, views, freedom, told=told)
         calibrated = state.views if calibrating else None
         state = Solver(coarse[len(calibrating) :])(seen, pictures, state.views, freedom, told=told)
+        fine = Solver(levels[-1:], systematic=self.systematic)
         last = freedom if levels[-1].moves == "both" else held(freedom)
         if freedom.unknowns:  # the cameras have moved, and with them the outline of the part in the pictures
             deviation = np.zeros(len(nominal.mesh))
             deviation[seen.node] = state.deviation
             seen = self._scene(nominal, state.views, masks)
-            state = Solver(levels[-1:])(seen, pictures, state.views, freedom, deviation[seen.node], told)
+            state = fine(seen, pictures, state.views, freedom, deviation[seen.node], told)
         found = self._found(seen, pictures, state, last)
         for _ in range(ROUNDS):
             good = self._good(seen, found) & (seen.tilt(state.deviation) <= STEEPEST_TILT)
@@ -123,12 +126,16 @@ class Correlate:
                 break
             _require_some(good, found)
             seen, node = seen.restricted(good)
-            state = Solver(levels[-1:])(seen, pictures, state.views, freedom, state.deviation[node], told)
+            state = fine(seen, pictures, state.views, freedom, state.deviation[node], told)
             found = self._found(seen, pictures, state, last)
         systematic = self.systematic
         if systematic is not None:
-            systematic = at_least(systematic, disagreement(seen, pictures.sharp, state.views, state.motion), seen)
-        sure = uncertainty(seen, found, state.views, state.weights, last, systematic, state.motion)
+            systematic = systematic.at_least(disagreement(seen, pictures.sharp, state.views, state.motion), seen)
+            if systematic is not self.systematic and last.unknowns:
+                fine = replace(fine, systematic=systematic)
+                state = fine(seen, pictures, state.views, freedom, state.deviation, told)
+                found = self._found(seen, pictures, state, last)
+        sure = uncertainty(seen, found, state.views, state.weights, last, systematic, state.shift, state.motion)
         local = float(np.sqrt(np.median(sure.system.motion.quadratic(seen.space.rows(seen)))))
         motions = hidden_motions(seen, sure.system, last, local)
         if last.poses != "known" and not seen.space.confined:
@@ -145,16 +152,15 @@ class Correlate:
 
     def _found(self, seen: Scene, pictures: Pictures, state: State, freedom: Freedom) -> Facets:
         """Return what the pictures say about the facets in the end, as `uncertainty` needs it."""
-        columns, whole = needed_columns(freedom, self.systematic), self.systematic is not None
         return facets(
             seen,
             pictures.sharp,
             state.views,
             state.motion,
             state.weights,
-            columns,
+            needed_columns(freedom, self.systematic),
             power=2,
-            whole=whole,
+            whole=self.systematic is not None and freedom.unknowns > 0,
             origin=freedom.origin,
         )
 

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import chi2
 
 from inspect3d.arrays import Floats, Integers, unit
 from inspect3d.camera import View
 from inspect3d.correlation.picture import Stack
 from inspect3d.correlation.scene import Scene
-from inspect3d.correlation.uncertainty import Systematic
+from inspect3d.correlation.shift import slopes_of
 
 NEAR, FAR = 1.5, 4.0  # facet sizes between the facets of a pair
 SAMPLE = 4000  # facets whose neighbours are looked up
-STEP = 1e-3  # mm
 ENOUGH = 50  # pairs of facets
-PLACES = 1000  # facets that tell how many patches of a shift the part has room for
-CHANCE = 0.01  # of a shift of the stated size looking larger
 
 
 def disagreement(scene: Scene, stack: Stack, views: Sequence[View], motion: Floats) -> float:
@@ -57,24 +52,6 @@ def disagreement(scene: Scene, stack: Stack, views: Sequence[View], motion: Floa
     return float(np.sqrt(max(sums / weights, 0.0) / 2)) if weights > 0 else 0.0
 
 
-def at_least(stated: Systematic, found: float, scene: Scene) -> Systematic:
-    """Return a smooth shift of the pictures as it is stated, or of the size that was found where that is beyond chance.
-
-    The mean square of a shift over the part has a spread of its own: that of chi-square over ν degrees of freedom,
-    1 / ν being the mean of its squared correlation between two places, of each picture beyond the first.
-
-    Parameters
-    ----------
-    found : px, see `disagreement`
-    """
-    centres = scene.nodes[scene.triangles].mean(axis=1)
-    centres = centres[np.linspace(0, len(centres) - 1, min(PLACES, len(centres))).astype(np.int64)]
-    squared = ((centres[:, None] - centres[None]) ** 2).sum(axis=2)
-    patches = (scene.taking.shape[1] - 1) / np.exp(-squared / stated.length**2).mean()
-    usual = found**2 <= stated.size**2 * chi2.isf(CHANCE, patches) / patches
-    return stated if usual else replace(stated, size=found)
-
-
 def _shifts(
     scene: Scene, stack: Stack, views: Sequence[View], pair: tuple[int, ...], motion: Floats, shown: Integers
 ) -> tuple[Floats, Floats]:
@@ -108,16 +85,7 @@ def _shifts(
 def _local(scene: Scene, views: Sequence[View], shown: Integers) -> tuple[Floats, Floats]:
     """Return, for each shown facet, the map (f, 2, 2) of shifts in the second picture to the first, and the direction
     (f, 2) in the first picture across the epipolar lines, unit."""
-    corners = scene.nodes[scene.triangles[shown]]
-    centre = corners.mean(axis=1)
-    sides = [unit(corners[:, k] - corners[:, 0]) for k in (1, 2)]
-    normal = unit(np.cross(sides[0], sides[1]))
-    slopes = [
-        np.stack(
-            [(view.project(centre + STEP * way) - view.project(centre)) / STEP for way in (*sides, normal)], axis=2
-        )
-        for view in views
-    ]
+    slopes = np.moveaxis(slopes_of(scene, views)[shown], 1, 0)
     first_from_second = slopes[0][:, :, :2] @ np.linalg.inv(slopes[1][:, :, :2])
     epipolar = slopes[0][:, :, 2] - np.einsum("fij,fj->fi", first_from_second, slopes[1][:, :, 2])
     return first_from_second, unit(np.stack([-epipolar[:, 1], epipolar[:, 0]], axis=1))

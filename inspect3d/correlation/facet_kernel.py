@@ -38,7 +38,7 @@ from inspect3d.correlation.reading_kernel import (
 )
 from inspect3d.correlation.row_kernel import normalised, product, total
 
-Out = tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats]
+Out = tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats]
 
 CHUNKS = 64
 FEWEST = 6
@@ -73,8 +73,9 @@ def accumulate(
     columns : (c,) the camera parameters of each view in the cross and camera blocks: turns 0
         to 2, shifts 3 to 5, then as in `reading_kernel.lens_slope`
     out : arrays to be written, for C = v c: node (f, 3, 3), right (f, 3), cross (f, 3, C), camera (64, C, C),
-        camera_right (64, C), whole (f, C, C), each facet's camera
-        block, or empty, statistics (f, 4): E, evaluation points, mean correlation of the pictures, clean share
+        camera_right (64, C), whole (f, C, C) and each_right (f, C), each facet's camera block and
+        right-hand side, or empty, statistics (f, 4): E, evaluation points, mean correlation of the pictures, clean
+        share
     """
     facets, views, c = len(taking), taking.shape[1], len(columns)
     most = 1
@@ -91,7 +92,7 @@ def accumulate(
                 if taking[f, k]:
                     seen[k_seen] = k
                     k_seen += 1
-            out[6][f] = 0.0
+            out[7][f] = 0.0
             n = 0
             if k_seen >= 2:
                 n = place_facet(points, f, deviation, placed)
@@ -102,7 +103,7 @@ def accumulate(
                 out[0][f], out[1][f], out[2][f] = 0.0, 0.0, 0.0
                 continue
             _share(placed, reading, k_seen, n, spread, work)
-            _judge(reading, k_seen, n, spread, work, out[6][f])
+            _judge(reading, k_seen, n, spread, work, out[7][f])
             for m in range(k_seen):
                 at = m * (3 + c)
                 _write_nodes(placed, reading[m], n, work, rows[at : at + 3])
@@ -248,7 +249,7 @@ def _deal(
     out: Out,
 ) -> None:
     """Deal a facet's block out to the arrays of all facets and all cameras; see `accumulate`."""
-    node, node_right, cross, camera, camera_right, whole, statistics = out
+    node, node_right, cross, camera, camera_right, whole, each_right, statistics = out
     factor = weight * statistics[f, 3] ** power
     for i in range(3):
         node_right[f, i] = right[i]
@@ -260,6 +261,8 @@ def _deal(
         for i in range(c):
             own, at = 3 + m * c + i, seen[m] * c + i
             camera_right[chunk, at] += weight * right[own]
+            if len(whole):
+                each_right[f, at] = right[own]
             for j in range(3):
                 cross[f, j, at] = block[j, own]
             for other in range(views):

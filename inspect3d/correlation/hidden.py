@@ -58,17 +58,17 @@ def hidden_motions(scene: Scene, system: System, freedom: Freedom, local: float)
         words = "growth of the whole part: the scale is not known"
         found.append(HiddenMotion(words, growth / size if size > 0 else growth, np.inf, 0.0))
     found += _unseen(scene, system, freedom)
-    factor = system.camera_factor
+    factor = system.factor_by_cameras
     if not factor.size:
         return tuple(found)
     response = scene.space.rows(scene) @ system.following @ factor
     _, sizes, mixes = np.linalg.svd(response[whole], full_matrices=False)
     sizes = sizes / np.sqrt(np.count_nonzero(whole))
     _, sigmas = freedom.spread(freedom.columns)
-    scale = np.sqrt(np.diag(factor @ factor.T))
+    scale = np.sqrt((factor[: len(sigmas)] ** 2).sum(axis=1))
     for size, mix in zip(sizes, mixes, strict=True):
         if size > LOUD * local:
-            cameras = factor @ mix
+            cameras = factor[: len(sigmas)] @ mix
             prior = float(((cameras / sigmas) ** 2).sum())
             words = _words(cameras / np.where(scale > 0, scale, 1.0), freedom)
             words = f"{words}: {1000 * size:.2g} µm rms of the map, {100 * prior:.0f} % of what is known from the prior"

@@ -11,6 +11,7 @@ from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.scene import Scene
+from inspect3d.correlation.shift import ShiftBlocks
 from inspect3d.correlation.system import System
 from inspect3d.register.gauge import FREE
 from inspect3d.register.mobility import jacobian, spread
@@ -87,6 +88,7 @@ def system_of(
     scale: Floats,
     slides: Floats,
     stiffness: float = 0.0,
+    shift: ShiftBlocks | None = None,
 ) -> System:
     """Return the normal equations.
 
@@ -98,6 +100,7 @@ def system_of(
     scale : (m,) of each camera unknown, what moves the pictures by one pixel; see `Freedom.scale`
     slides : (m, s), see `slides_of`
     stiffness : see `inspect3d.correlation.space.plates`
+    shift : what the pictures show of a smooth shift of them, as unknowns beside the cameras
     """
     space, weights = scene.space, (factors / noise)[:, None, None]
     motion = space.factored(scene, space.matrix(scene, found.node * weights, stiffness)[0])
@@ -105,4 +108,17 @@ def system_of(
     mixing, sigmas = freedom.spread(columns)
     cross = space.gathered(scene, found.cross * weights) @ mixing
     camera = mixing.T @ found.camera @ mixing / noise
-    return System(motion, cross, camera, gauge, 1 / sigmas**2, scale, slides, freedom.redundant)
+    if shift is None:
+        return System(motion, cross, camera, gauge, 1 / sigmas**2, scale, slides, freedom.redundant)
+    count = len(shift.scale)
+    return System(
+        motion,
+        np.hstack([cross, shift.shape]),
+        np.block([[camera, shift.cameras], [shift.cameras.T, shift.own]]),
+        gauge,
+        np.concatenate([1 / sigmas**2, np.ones(count)]),
+        np.concatenate([scale, shift.scale]),
+        np.pad(slides, ((0, count), (0, 0))),
+        np.pad(freedom.redundant, ((0, count), (0, 0))),
+        count,
+    )

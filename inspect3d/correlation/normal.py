@@ -25,7 +25,7 @@ class Facets:
     right : (f, 3) right-hand side
     cross : (f, 3, C) nodes against the camera parameters of all views
     camera, camera_right : (C, C) and (C,), sums over the facets with their weights
-    whole : (f, C, C), the camera block of each facet, or empty
+    whole, each_right : (f, C, C) and (f, C), the camera block and right-hand side of each facet, or empty
     statistics : (f, 4)
     freedom : (f,) degrees of freedom: points less mean and scale, for each view beyond the first; 0 without contrast
     """
@@ -36,6 +36,7 @@ class Facets:
     camera: Floats
     camera_right: Floats
     whole: Floats
+    each_right: Floats
     statistics: Floats
     freedom: Floats
 
@@ -88,7 +89,7 @@ def facets(
     columns : camera parameters of each view to differentiate by
     power : how often the sums over the cameras take the clean share of the curvature: 0, the curvature as it is; 1,
         the curvature without gradient noise H₀; 2, the information H₀ A⁻¹ H₀ of an estimate that has noisy slopes
-    whole : keep each facet's camera block
+    whole : keep each facet's camera block and right-hand side
     points : to compare at, some of the scene's; none: all of them
     origin : (3,) mm, about which the cameras' parameters turn the part, that of the `Freedom`; none: the scene's centre
     """
@@ -110,6 +111,7 @@ def facets(
         np.zeros((CHUNKS, size, size)),
         np.zeros((CHUNKS, size)),
         np.zeros((f if whole else 0, size, size)),
+        np.zeros((f if whole else 0, size)),
         np.empty((f, 4)),
     )
     accumulate(
@@ -123,7 +125,7 @@ def facets(
         columns,
         out,
     )
-    statistics = out[6]
+    statistics = out[7]
     beyond = scene.taking.sum(axis=1) - 1
     freedom = np.where(statistics[:, 1] > 0, statistics[:, 1] - 2.0, 0.0) * beyond
-    return Facets(*out[:3], out[3].sum(axis=0), out[4].sum(axis=0), out[5], statistics, freedom)
+    return Facets(*out[:3], out[3].sum(axis=0), out[4].sum(axis=0), out[5], out[6], statistics, freedom)

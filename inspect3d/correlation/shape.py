@@ -13,7 +13,8 @@ from inspect3d.correlation.hidden import HiddenMotion
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.solver import State
-from inspect3d.correlation.uncertainty import Systematic, Uncertainty
+from inspect3d.correlation.systematic import Systematic
+from inspect3d.correlation.uncertainty import Uncertainty
 from inspect3d.deviate.deviation import Deviation
 from inspect3d.nominal.nominal import InspectionMesh
 from inspect3d.register.gauge import Gauge, best_fit

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from scipy import sparse
 
-from inspect3d.arrays import Floats
+from inspect3d.arrays import Floats, Integers
 from inspect3d.camera import View
 from inspect3d.correlation.bounded_step import bounded_step
 from inspect3d.correlation.conjugate import conjugate
@@ -18,8 +18,10 @@ from inspect3d.correlation.linear import noise_of, robust, slides_of, system_of
 from inspect3d.correlation.normal import Facets, facets
 from inspect3d.correlation.picture import Pictures, Stack
 from inspect3d.correlation.scene import Scene
+from inspect3d.correlation.shift import Shift, needed_columns, shift_blocks, shift_of
 from inspect3d.correlation.space import Factored, Matrix
 from inspect3d.correlation.still import stilled
+from inspect3d.correlation.systematic import Systematic
 from inspect3d.outcome import MeasurementError
 from inspect3d.register.mobility import spread
 
@@ -81,6 +83,7 @@ class State:
     weights : (f,) of the facets
     steps : how it came there
     settled : the last step was shorter than the tolerance
+    shift : (q,) of a smooth shift of the pictures found beside the cameras, see `ShiftBlocks`; else none
     """
 
     motion: Floats
@@ -89,6 +92,7 @@ class State:
     weights: Floats
     steps: tuple[Step, ...] = ()
     settled: bool = False
+    shift: Floats = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,8 @@ class Solver:
     Parameters
     ----------
     levels : in their order
+    systematic : a smooth shift of the pictures, which unknown cameras share out between themselves and it where the
+        pictures are not blurred and cameras and shape move: cameras that took it all would run far off their priors
     tolerance : mm; the last level ends when no node moves farther in a step, or by more than half a per cent of the
         uncertainty that unknown cameras give the shape; the others at half a micrometre, times the pixels of the blur.
         Where the nodes do not move by themselves it takes a tenth of a micrometre, and three
@@ -110,6 +116,7 @@ class Solver:
 
     levels: tuple[Level, ...]
     tolerance: float = 1e-5
+    systematic: Systematic | None = None
 
     def __call__(
         self,
@@ -156,6 +163,9 @@ class Solver:
         tolerance = max(self.tolerance, fine if final else coarse * max(1.0, level.blur))
         last, factor = np.zeros(len(state.motion)), 1.0
         rows = scene.space.rows(scene)
+        shared = self.systematic if final and freedom.unknowns and level.moves == "both" else None
+        columns = needed_columns(freedom, shared)
+        known = None if shared is None else shift_of(scene, state.views, shared)
         similar: Factored | None = None
         before: _Stride | None = None
         for count in range(level.steps):
@@ -165,7 +175,8 @@ class Solver:
                 state.views,
                 state.motion,
                 state.weights,
-                freedom.columns,
+                columns,
+                whole=known is not None,
                 points=points,
                 origin=freedom.origin,
             )
@@ -181,9 +192,9 @@ class Solver:
                 continue
             sure = 0.0
             if freedom.unknowns or level.moves in ON_NOMINAL:
-                shape, cameras, sure = _step(scene, found, noise, state, freedom, level)
+                shape, cameras, shift, sure = _step(scene, found, noise, state, freedom, level, columns, known)
             else:
-                cameras = np.zeros(0)
+                cameras, shift = np.zeros((2, 0))
                 shape, similar = _step_of_shape(scene, found, noise, state, level, similar)
             change = max(
                 float(np.abs(rows @ shape).max()), _reach(scene, cameras, freedom) if level.moves in ON_NOMINAL else 0
@@ -205,6 +216,7 @@ class Solver:
                 weights=weights,
                 steps=(*state.steps, step),
                 settled=change < max(tolerance, SETTLED * sure),
+                shift=shift,
             )
             if state.settled:
                 break
@@ -237,10 +249,23 @@ def held(freedom: Freedom, poses: bool = True) -> Freedom:
 
 
 def _step(
-    scene: Scene, found: Facets, noise: float, state: State, freedom: Freedom, level: Level
-) -> tuple[Floats, Floats, float]:
-    """Return the step of shape and cameras, and the rms uncertainty (mm) that the cameras give the shape."""
-    mixing, sigmas = freedom.spread(freedom.columns)
+    scene: Scene,
+    found: Facets,
+    noise: float,
+    state: State,
+    freedom: Freedom,
+    level: Level,
+    columns: Integers,
+    known: Shift | None,
+) -> tuple[Floats, Floats, Floats, float]:
+    """Return the step of shape and cameras, the shift, and the rms uncertainty (mm) that the cameras give the shape.
+
+    Parameters
+    ----------
+    columns : camera parameters of each view in `found`
+    known : of a smooth shift of the pictures, which is found along with the cameras and anew in each step
+    """
+    mixing, sigmas = freedom.spread(columns)
     scale, slides = freedom.scale(state.views, scene.sample), slides_of(scene, freedom, state.views)
     camera_right = mixing.T @ found.camera_right / noise - freedom.offset(state.views) / sigmas**2
     if level.moves in ON_NOMINAL:
@@ -249,14 +274,18 @@ def _step(
         cameras = bounded_step(
             scene, state.views, freedom, firm, firm.T @ matrix @ firm, camera_right, max(level.blur, FARTHEST)
         )
-        return np.zeros(len(state.motion)), cameras, 0.0
-    factors = state.weights * found.clean
-    system = system_of(scene, found, factors, noise, freedom, freedom.columns, scale, slides, level.stiffness)
-    shape, cameras = system.solve(_equations(scene, found, noise, state, level)[1], camera_right)
+        return np.zeros(len(state.motion)), cameras, np.zeros(0), 0.0
+    factors, blocks = state.weights * found.clean, None
+    if known is not None:
+        blocks = shift_blocks(scene, found, columns, mixing, known, factors / noise, state.weights / noise)
+        camera_right = np.concatenate([camera_right, blocks.right])
+    system = system_of(scene, found, factors, noise, freedom, columns, scale, slides, level.stiffness, blocks)
+    shape, together = system.solve(_equations(scene, found, noise, state, level)[1], camera_right)
+    cameras, shift = np.split(together, [len(sigmas)])
     if freedom.poses != "known" and level.blur == 0:  # the blurred pictures have shown where the surface lies
         shape, cameras = stilled(scene, freedom, state.views, state.deviation, shape, cameras)
-    by_cameras = (scene.space.rows(scene) @ system.following @ system.camera_factor)[scene.whole]
-    return shape, cameras, float(np.sqrt((by_cameras**2).sum() / max(len(by_cameras), 1)))
+    by_cameras = (scene.space.rows(scene) @ system.following @ system.factor_by_cameras)[scene.whole]
+    return shape, cameras, shift, float(np.sqrt((by_cameras**2).sum() / max(len(by_cameras), 1)))
 
 
 def _step_of_shape(

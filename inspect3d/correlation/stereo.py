@@ -15,7 +15,7 @@ from inspect3d.correlation.picks import FEWEST, Picks
 from inspect3d.correlation.picture import Interpolation
 from inspect3d.correlation.solver import Step
 from inspect3d.correlation.start import StereoStart
-from inspect3d.correlation.uncertainty import Systematic
+from inspect3d.correlation.systematic import Systematic
 from inspect3d.correlation.words import contributions, remarks
 from inspect3d.files.calibration import Rig, what_is_known
 from inspect3d.files.calibration_load import load_calibration

@@ -31,6 +31,7 @@ class System:
     scale : (m,) the units of the unknowns p in which their stiffnesses compare
     slides : (m, s) changes of the cameras that no picture shows, held
     redundant : (m, r) changes of the cameras that others stand for, held
+    shifts : how many of the m unknowns, the last ones, are numbers of a smooth shift of the pictures
     """
 
     motion: Factored
@@ -41,6 +42,7 @@ class System:
     scale: Floats
     slides: Floats
     redundant: Floats
+    shifts: int = 0
 
     @cached_property
     def held(self) -> tuple[Floats, Floats]:
@@ -106,6 +108,14 @@ class System:
     def camera_covariance(self) -> Floats:
         """Return (R + P)⁺, (m, m)."""
         return self.camera_factor @ self.camera_factor.T
+
+    @property
+    def factor_by_cameras(self) -> Floats:
+        """Return those columns of F, turned, by which cameras alone are unsure: shifts only go along with them."""
+        if not self.shifts:
+            return self.camera_factor
+        alone = self.camera_factor[: -self.shifts] / self.scale[: -self.shifts, None]
+        return self.camera_factor @ np.linalg.svd(alone, full_matrices=False)[2].T
 
     def solve(self, right: Floats, camera_right: Floats) -> tuple[Floats, Floats]:
         """Return q and p for right-hand sides b (n,) and s (m,), or more columns."""

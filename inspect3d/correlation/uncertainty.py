@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from inspect3d.arrays import Floats, Integers
+from inspect3d.arrays import Floats
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
 from inspect3d.correlation.lack_of_fit import lack_of_fit
@@ -18,26 +18,11 @@ from inspect3d.correlation.misfit import misfit, unresolved
 from inspect3d.correlation.model_error import ModelError, model_error
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.scene import Scene
+from inspect3d.correlation.shift import needed_columns, shift_blocks, shift_of, without_shift
 from inspect3d.correlation.smoothing import Smoothing
 from inspect3d.correlation.solver import held
 from inspect3d.correlation.system import System
-
-SHIFT_X, SHIFT_Y = 8, 9
-LANDMARKS, RANK = 600, 1e-4
-
-
-@dataclass(frozen=True)
-class Systematic:
-    """A smooth shift of each picture that nothing explains, stated rather than estimated.
-
-    Parameters
-    ----------
-    size : px, standard deviation of each coordinate in each picture
-    length : mm over the part, of its Gaussian correlation exp(-d² / 2 L²)
-    """
-
-    size: float
-    length: float
+from inspect3d.correlation.systematic import Systematic
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +34,7 @@ class Uncertainty:
     Parameters
     ----------
     system : the information of the pictures and priors; its inverse is C
-    shifts : F (k, r), the response of the shape to the systematic field
+    shifts : F (k, r), what of the systematic shift looks like a deviation
     smoother : T (n, k), from the motions of the scene's space to the deviation of its nodes
     rough : m (n,) mm, of nodes where the elements do not fit, as at a step; 0 elsewhere. Of a smoothed map the bias too
     noise : variance of the residuals where they fit, grey levels²
@@ -110,11 +95,6 @@ class Uncertainty:
         return self.smoothing or self.system
 
 
-def needed_columns(freedom: Freedom, systematic: Systematic | None) -> Integers:
-    """Return the camera parameters of each view that `uncertainty` needs the facets' derivatives by."""
-    return freedom.columns if systematic is None else np.union1d(freedom.columns, [SHIFT_X, SHIFT_Y])
-
-
 def uncertainty(
     scene: Scene,
     found: Facets,
@@ -122,6 +102,7 @@ def uncertainty(
     weights: Floats,
     freedom: Freedom,
     systematic: Systematic | None,
+    shift: Floats,
     motion: Floats,
 ) -> Uncertainty:
     """Return how sure a solution is.
@@ -138,71 +119,43 @@ def uncertainty(
     found : what the pictures say about the facets without blur, by `needed_columns` and in the power 2, with each
         facet's camera block where there is a systematic field
     weights : (f,) of the facets
-    systematic : the field to propagate; its response is that of the estimate to a shift of picture k, H₀⁻¹ J'W h_k
+    systematic : the shift of the pictures. What of it looks like a deviation is added; what the pictures show of it was
+        found beside unknown cameras and is among the unknowns of the system
+    shift : (q,) what was found of it, see `State`
     motion : (k,) mm, the solution
     """
-    columns = needed_columns(freedom, systematic)
+    columns, known = needed_columns(freedom, systematic), None
+    if systematic is not None:
+        known = shift_of(scene, views, systematic)
+        if freedom.unknowns:
+            found = without_shift(scene, found, columns, known, shift)
     rows, mixing = scene.space.rows(scene), freedom.spread(columns)[0]
     noise = noise_of(found, weights, rows.shape[1] + freedom.unknowns)
     factors = weights * found.clean**2
     scale, slides = freedom.scale(views, scene.sample), slides_of(scene, freedom, views)
-    free, left, before = scene, found, noise
+    free, left, before, cameras = scene, found, noise, mixing
     still = held(freedom)
     if scene.space.confined:
         lack = lack_of_fit(scene, found, views, weights, still, columns)
         free, left, before, first = lack.scene, lack.left, lack.noise, lack.system
-        mixing = still.spread(columns)[0]
+        cameras = still.spread(columns)[0]
     else:
         first = system_of(scene, found, factors, noise, freedom, columns, scale, slides)
-    summed = misfit(free, left, weights / before, first, mixing)
+    summed = misfit(free, left, weights / before, first, cameras)
     unknowns = len(scene.nodes) + freedom.unknowns
     noise = noise_of(left, weights * summed.fitted, round(unknowns * summed.fitted.mean()))
     total = noise * summed.correlated
-    system = system_of(scene, found, factors, total, freedom, columns, scale, slides)
+    blocks = None
+    if known is not None and freedom.unknowns:
+        blocks = shift_blocks(scene, found, columns, mixing, known, factors / total, weights / total)
+    system = system_of(scene, found, factors, total, freedom, columns, scale, slides, shift=blocks)
     rough, model = np.zeros(len(scene.nodes)), None
     if scene.space.confined:
         model = model_error(scene, found, views, weights, still, columns, lack, summed, total, motion)
     else:
         rough = unresolved(scene, left, total, summed.fitted)
     shifts = np.zeros((len(system.cross), 0))
-    if systematic is not None:
-        shares = weights * found.clean / total
-        shifts = _shifts(scene, found, shares, system, freedom.spread(columns)[0], columns, systematic)
+    if known is not None:
+        shifts = np.stack([scene.space.motion(scene, field) for field in known.deviation.T], axis=1)
     smoother = scene.space.smoother(scene, weights)
     return Uncertainty(system, shifts, smoother, rough, noise, summed.correlated, model=model)
-
-
-def _shifts(
-    scene: Scene,
-    found: Facets,
-    shares: Floats,
-    system: System,
-    mixing: Floats,
-    columns: Integers,
-    systematic: Systematic,
-) -> Floats:
-    """Return the response F (n, r) of the shape to the modes of the systematic field, by picture and coordinate."""
-    fields = systematic.size * _modes(scene.nodes[scene.triangles].mean(axis=1), systematic.length)
-    c = len(columns)
-    responses = []
-    for view in range(scene.taking.shape[1]):
-        for column in (SHIFT_X, SHIFT_Y):
-            at = view * c + int(np.searchsorted(columns, column))
-            weighted = shares[:, None] * fields
-            shape = scene.space.gathered(scene, found.cross[:, :, at, None] * weighted[:, None, :])
-            cameras = mixing.T @ (found.whole[:, :, at].T @ weighted)
-            responses.append(system.solve(shape, cameras)[0])
-    return np.concatenate(responses, axis=1)
-
-
-def _modes(centres: Floats, length: float) -> Floats:
-    """Return Φ (f, r) with Φ Φ' = exp(-d² / 2 L²) between the centres (f, 3), from landmarks among them (Nyström)."""
-    chosen = centres[np.linspace(0, len(centres) - 1, min(LANDMARKS, len(centres))).astype(np.int64)]
-    values, vectors = np.linalg.eigh(_gaussian(chosen, chosen, length))
-    kept = values > RANK * values[-1]
-    return _gaussian(centres, chosen, length) @ (vectors[:, kept] / np.sqrt(values[kept]))
-
-
-def _gaussian(a: Floats, b: Floats, length: float) -> Floats:
-    squared = ((a[:, None, :] - b[None, :, :]) ** 2).sum(axis=2)
-    return np.exp(-squared / (2 * length**2))
