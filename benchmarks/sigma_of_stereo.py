@@ -110,21 +110,23 @@ def _score(settings: Correlate, trial: Trial, element: float) -> Score:
     sigma = np.sqrt(shape.uncertainty.variances)
     seconds = time.perf_counter() - started
     sound = shape.sound
+    away = sound & ~trial.near_step(shape.scene.nodes, element)
     error = error_of(shape, trial, shape.values)
     gauge, weak = modes_of(shape, trial)
     both = np.column_stack([gauge, weak])
-    raw, raw_sigma = _without(shape, error, gauge, sigma)
-    rest, rest_sigma = _without(shape, error, both, sigma)
+    raw, raw_sigma = _without(shape, error, gauge, sigma, away)
+    rest, rest_sigma = _without(shape, error, both, sigma, away)
     distance = 0.0
     if weak.shape[1]:
-        fields = (weak / len(weak)) * sound[:, None]
-        sizes = fields.T @ (error - gauge @ (gauge.T @ error))
+        fields = (weak / len(weak)) * away[:, None]
+        fields = fields - remover(gauge, away).T @ (gauge.T @ fields)
+        sizes = fields.T @ error
         distance = float(sizes @ np.linalg.solve(fields.T @ shape.uncertainty.covariance(fields), sizes))
     naive = error_of(shape, trial, shape.state.deviation)
     covariance = _naive(shape, trial, gauge)
     claims = []
     for modes in (both, gauge):
-        free = np.eye(len(naive)) - modes @ remover(modes, sound)
+        free = np.eye(len(naive)) - modes @ remover(modes, away)
         claims += [free @ naive, np.sqrt(np.einsum("ij,jk,ik->i", free, covariance, free))]
     share = shape.scene.share >= 1
     everywhere = np.full((8, len(shape.mesh)), np.nan)
@@ -142,11 +144,11 @@ def _score(settings: Correlate, trial: Trial, element: float) -> Score:
     )
 
 
-def _without(shape: Shape, error: Floats, modes: Floats, sigma: Floats) -> tuple[Floats, Floats]:
-    """Return an error less its modes, by least squares over the observed nodes, and what the claim is for it."""
+def _without(shape: Shape, error: Floats, modes: Floats, sigma: Floats, away: Booleans) -> tuple[Floats, Floats]:
+    """Return an error less its modes, by least squares over nodes away from steps, and what the claim is for it."""
     if not modes.shape[1]:
         return error, sigma
-    inverse = remover(modes, shape.sound)
+    inverse = remover(modes, away)
     return error - modes @ (inverse @ error), np.sqrt(shape.uncertainty.variances_without(modes, inverse))
 
 
