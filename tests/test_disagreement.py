@@ -10,6 +10,7 @@ from inspect3d.correlation.disagreement import disagreement
 from inspect3d.correlation.freedom import Freedom, Lens, Stand
 from inspect3d.correlation.picture import Pictures
 from inspect3d.correlation.scene import scene
+from inspect3d.correlation.shift import shift_of, slopes_of
 from inspect3d.correlation.systematic import Systematic
 from inspect3d.correlation.texture import speckle_size
 from tests.sheets import sheet
@@ -61,6 +62,21 @@ def test_a_stated_shift_is_not_made_larger_by_chance(length):
     larger = np.mean([stated.at_least(size, seen).size > stated.size for size in sizes])
     assert 0.002 < larger < 0.03
     assert stated.at_least(4 * stated.size, seen).size == 4 * stated.size
+
+
+@pytest.mark.parametrize("angles", [(-0.2, 0.2), (-0.25, 0.0, 0.25)])
+def test_what_pictures_show_of_a_shift_is_neither_a_deviation_nor_a_slide(angles):
+    views = rig(angles=angles)
+    seen = scene(sheet(edge=6.0), views, 5.0, STEEPEST, [None] * len(views))
+    known, slopes = shift_of(seen, views, Systematic(0.02, 15.0)), slopes_of(seen, views).reshape(-1, 2 * len(views), 3)
+    alike = known.shown @ slopes
+    everywhere = seen.taking.all(axis=1)
+    assert np.abs(alike[everywhere]).max() < 1e-6 * np.abs(slopes).max()
+    assert np.trace(known.shown[everywhere], axis1=1, axis2=2) == pytest.approx(2 * len(views) - 3)
+    assert known.shown[everywhere] @ known.shown[everywhere] == pytest.approx(known.shown[everywhere], abs=1e-9)
+    sizes = np.sqrt((known.deviation**2).sum(axis=1))
+    per_pixel = np.linalg.norm(np.linalg.pinv(slopes[everywhere])[:, 2], axis=1)
+    assert np.median(sizes) == pytest.approx(0.02 * np.median(per_pixel), rel=0.05)
 
 
 def test_the_stands_of_a_rig_that_move_as_one_move_the_part():

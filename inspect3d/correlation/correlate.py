@@ -128,14 +128,13 @@ class Correlate:
             seen, node = seen.restricted(good)
             state = fine(seen, pictures, state.views, freedom, state.deviation[node], told)
             found = self._found(seen, pictures, state, last)
-        systematic = self.systematic
+        size, systematic = 0.0, self.systematic
         if systematic is not None:
             systematic = systematic.at_least(disagreement(seen, pictures.sharp, state.views, state.motion), seen)
-            if systematic is not self.systematic and last.unknowns:
-                fine = replace(fine, systematic=systematic)
-                state = fine(seen, pictures, state.views, freedom, state.deviation, told)
-                found = self._found(seen, pictures, state, last)
-        sure = uncertainty(seen, found, state.views, state.weights, last, systematic, state.shift, state.motion)
+            size = systematic.size
+        sure = uncertainty(
+            seen, found, state.views, state.weights, last, self.systematic, size, state.shift, state.motion
+        )
         local = float(np.sqrt(np.median(sure.system.motion.quadratic(seen.space.rows(seen)))))
         motions = hidden_motions(seen, sure.system, last, local)
         if last.poses != "known" and not seen.space.confined:

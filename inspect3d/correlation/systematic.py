@@ -28,6 +28,12 @@ class Systematic:
     size: float
     length: float
 
+    def __post_init__(self) -> None:
+        if not (self.size > 0 and self.length > 0):
+            raise ValueError(
+                f"a systematic shift has a size and a length above 0, not {self.size:g} and {self.length:g}"
+            )
+
     def modes(self, scene: Scene) -> tuple[Floats, Floats]:
         """Return Φ (f, r) px of the facets and (n, r) of the nodes, with Φ Φ' the covariance of a coordinate.
 

@@ -102,6 +102,7 @@ def uncertainty(
     weights: Floats,
     freedom: Freedom,
     systematic: Systematic | None,
+    size: float,
     shift: Floats,
     motion: Floats,
 ) -> Uncertainty:
@@ -119,8 +120,9 @@ def uncertainty(
     found : what the pictures say about the facets without blur, by `needed_columns` and in the power 2, with each
         facet's camera block where there is a systematic field
     weights : (f,) of the facets
-    systematic : the shift of the pictures. What of it looks like a deviation is added; what the pictures show of it was
-        found beside unknown cameras and is among the unknowns of the system
+    systematic : the shift of the pictures as stated. What of it looks like a deviation is added; what the pictures show
+        of it was found beside unknown cameras and is among the unknowns of the system
+    size : px, of the shift as it is, at least as stated; what it is more the solution has taken for something else
     shift : (q,) what was found of it, see `State`
     motion : (k,) mm, the solution
     """
@@ -155,7 +157,11 @@ def uncertainty(
     else:
         rough = unresolved(scene, left, total, summed.fitted)
     shifts = np.zeros((len(system.cross), 0))
-    if known is not None:
-        shifts = np.stack([scene.space.motion(scene, field) for field in known.deviation.T], axis=1)
+    if systematic is not None and known is not None:
+        looking = np.stack([scene.space.motion(scene, field) for field in known.deviation.T], axis=1)
+        shifts = size / systematic.size * looking
+        if blocks is not None and size > systematic.size:
+            response = system.solve(blocks.shape, np.vstack([blocks.cameras, blocks.own]))[0]
+            shifts = np.hstack([shifts, np.sqrt((size / systematic.size) ** 2 - 1) * response])
     smoother = scene.space.smoother(scene, weights)
     return Uncertainty(system, shifts, smoother, rough, noise, summed.correlated, model=model)
