@@ -20,6 +20,7 @@ from inspect3d.register.fit import Fit
 from inspect3d.register.gauge import ROUNDED, Gauge
 from inspect3d.register.icp import TUKEY, median_and_scale
 from inspect3d.register.mobility import jacobian, named
+from inspect3d.register.register import EXACT
 from inspect3d.register.similarity import Similarity
 
 FOREIGN = 0.02  # share of the CAD's diagonal beyond which a point is foreign, unless the recipe gives a reach
@@ -106,10 +107,13 @@ class Deviate:
         normals = _normals(clouds, alignments)
         noise = _common_noise(clouds, alignments)
         shares = _shares(clouds)
-        moved = Similarity.identity()
+        moved, rounded = Similarity.identity(), False
         for _ in range(self.steps):
             feet = nominal.surface.closest(moved(points))
             fit = self._observe(nominal, feet, moved.turned(normals), noise, shares, counted)
+            if not fit.noise > EXACT * nominal.diagonal:
+                noise, rounded = self._spread(nominal, feet), True
+                fit = self._observe(nominal, feet, moved.turned(normals), noise, shares, counted)
             seen = np.flatnonzero(fit.observed)
             value = fit.value[seen] - self.coating
             gauge = self.fit(mesh, seen, value, not self.scale_known)
@@ -128,7 +132,18 @@ class Deviate:
         if self.fit.kind != "best" or self.fit.locked:
             placed = tuple(_by_features(each, gauge, value) for each in placed)
         remarks = self._remarks(nominal, feet)
+        if rounded:
+            remarks += (
+                "Neighbouring points lie on exact planes, as where a sensor rounds its distances: their scatter does "
+                f"not tell how sure they are. Their spread about the CAD, {fit.noise:.2g} mm, is taken for their "
+                "noise; state `noise` where it is known.",
+            )
         return CloudDeviation(deviation, covariance, placed, moved(points), distance, fit.noise, remarks)
+
+    def _spread(self, nominal: Nominal, feet: Feet) -> float:
+        """Return the robust spread of the points of the part about the CAD, mm."""
+        distance = feet.distance[np.abs(feet.distance - self.coating) < (self.reach or FOREIGN * nominal.diagonal)]
+        return median_and_scale(distance)[1]
 
     def _remarks(self, nominal: Nominal, feet: Feet) -> tuple[str, ...]:
         reach = self.reach or FOREIGN * nominal.diagonal
