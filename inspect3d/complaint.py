@@ -48,7 +48,7 @@ def within(where: str, place: str) -> str:
 
 def unknown(key: str, known: Iterable[str]) -> str:
     """Return that a key is unknown, and the nearest of the known ones, or all where none is near."""
-    known = sorted(known)
+    known = sorted(set(known))
     near = get_close_matches(key.casefold(), known, 1, cutoff=0.5)
     return f"unknown key; did you mean {near[0]}?" if near else f"unknown key; known are {', '.join(known)}"
 

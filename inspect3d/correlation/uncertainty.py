@@ -34,7 +34,7 @@ class Uncertainty:
     Parameters
     ----------
     system : the information of the pictures and priors; its inverse is C
-    shifts : F (k, r), what of the systematic shift looks like a deviation
+    shifts : F (k, r), what of the systematic shift looks like a deviation, or is more than stated and moves the shape
     smoother : T (n, k), from the motions of the scene's space to the deviation of its nodes
     rough : m (n,) mm, of nodes where the elements do not fit, as at a step; 0 elsewhere. Of a smoothed map the bias too
     noise : variance of the residuals where they fit, grey levels²
