@@ -5,12 +5,15 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.picks import ideal_camera
 from inspect3d.correlation.start import DISTORTION
+from inspect3d.correlation.stereo import Stereo
 from inspect3d.inspection import check, run
+from inspect3d.measure import Files
 from inspect3d.nominal.load import load_nominal
 from inspect3d.outcome import InputError, MeasurementError, Status
 from inspect3d.pose import Pose
@@ -155,6 +158,29 @@ def test_pictures_of_two_parts_have_too_little_in_common(folder):
     pictured = [Pictured(each, None, view.camera, EXACT) for each, view in zip(grey, views, strict=True)]
     with pytest.raises(MeasurementError, match="too little in common"):
         FindStart(load_nominal(folder / "part.ply"))(pictured)
+
+
+def test_a_picture_without_speckle_is_named_though_the_others_are_enough(folder):
+    views = rig(angles=(-0.3, 0.0, 0.3))
+    grey = [picture(view, SheetSpeckle.drawn(np.random.default_rng(0), 0.7)) for view in views[:2]]
+    grey.append(np.tile(np.linspace(20.0, 200.0, grey[0].shape[1]), (len(grey[0]), 1)))
+    pictured = [Pictured(each, None, view.camera, EXACT) for each, view in zip(grey, views, strict=True)]
+    with pytest.raises(MeasurementError, match="Picture 3 shows 0 features, and 30 are needed"):
+        FindStart(load_nominal(folder / "part.ply"))(pictured, views)
+
+
+def test_a_blank_picture_is_refused_and_one_to_be_turned_is_told_of(folder, tmp_path):
+    cv2.imwrite(str(tmp_path / "blank.png"), np.full((512, 612), 90, np.uint8))
+    with Image.open(folder / "right.png") as right:
+        exif = right.getexif()
+        exif[0x0112] = 6
+        right.save(tmp_path / "turned.png", exif=exif)
+    method = Stereo(2450.0, (), False, "cubic", 65.0, 0.0, None, None, True)
+    blank, turned = ({"images": (folder / "left.png", tmp_path / name)} for name in ("blank.png", "turned.png"))
+    with pytest.raises(InputError, match=r"blank\.png is blank"):
+        method.open(Files(tmp_path, blank))
+    (remark,) = method.open(Files(tmp_path, turned)).remarks
+    assert "turned.png asks viewers to turn it" in remark
 
 
 def block(pocket):

@@ -32,7 +32,7 @@ from inspect3d.starting.features import Features, features
 from inspect3d.starting.fitting import FINAL, Fitted, fitted
 from inspect3d.starting.further import with_further
 from inspect3d.starting.outlined import weak_motions
-from inspect3d.starting.relative import joined, relative, triangulated
+from inspect3d.starting.relative import FEWEST, joined, relative, triangulated
 from inspect3d.starting.shown import Pictured, Shown
 from inspect3d.starting.tracks import tracks
 
@@ -71,11 +71,13 @@ class FindStart:
         Raises
         ------
         MeasurementError
-            The pictures have too little in common, or nothing in them lies on the CAD.
+            A picture shows hardly any features, or the pictures have too little in common, or the first camera does
+            not see the part from where it is said to be.
         """
         progress = running()
         progress.update(0.0, "looking for features")
         found = self._features(pictured)
+        _require_features(found)
         progress.update(0.3, "matching features")
         noise = NOISE * max(each.step for each in found)
         pixels = self._tracks(pictured, found)
@@ -185,6 +187,16 @@ class FindStart:
             )
         scale = float(np.median(hits.distance[met] / np.linalg.norm(sights[met], axis=1)))
         return Similarity(cad_from_first, scale)
+
+
+def _require_features(found: Sequence[Features]) -> None:
+    """Refuse a picture that is blank, or almost."""
+    for number, each in enumerate(found, start=1):
+        if len(each) < FEWEST:
+            raise MeasurementError(
+                f"Picture {number} shows {len(each)} features, and {FEWEST} are needed: is it of this part, sharp and "
+                "well exposed, and is the part speckled?"
+            )
 
 
 @dataclass(frozen=True, eq=False)
