@@ -65,7 +65,7 @@ def main() -> None:
     parser.add_argument("last", type=int, nargs="?", default=40)
     parser.add_argument("--map", action="store_true")
     asked = parser.parse_args()
-    near = wrong = same = apart = 0
+    near = wrong = same = moved = apart = 0
     for seed in range(asked.first, asked.last):
         scene = random_scene(seed)
         lens = Lens(ROUGH * scene.focal, CENTRE * max(scene.grey[0].shape), DISTORTION)
@@ -77,7 +77,8 @@ def main() -> None:
         more = ""
         if asked.map and found:
             maps = compared(scene, ended.views)
-            same, apart, more = same + maps.same, apart + maps.apart, f"; {maps.words}"
+            same, moved = same + (maps.same and not maps.moved), moved + (maps.same and maps.moved)
+            apart, more = apart + maps.apart, f"; {maps.words}"
         print(
             f"{seed:3d} {scene.part:9s} {len(scene.views)} cameras, {ended.seconds:5.1f} s: {ended.words}, "
             f"{error:.1f} px off{more}",
@@ -85,8 +86,8 @@ def main() -> None:
         )
     print(f"{near} of {asked.last - asked.first} found within {NEAR:g} px; {wrong} found elsewhere")
     if asked.map:
-        missing = asked.last - asked.first - same - apart
-        print(f"maps from start and picks: {same} the same, {apart} not, {missing} missing")
+        missing = asked.last - asked.first - same - moved - apart
+        print(f"maps from start and picks: {same} the same, {moved} more in one place, {apart} not, {missing} missing")
 
 
 if __name__ == "__main__":
