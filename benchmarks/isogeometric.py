@@ -9,7 +9,9 @@
 
 Lengths are in µm, times are CPU seconds of the correlation alone. z is error over sigma, cover the share within 1.96;
 "flagged" the share of nodes where splines do not follow the part, by their own word. Errors of unknown cameras are
-compared once motions listed as hidden or weak are out of both.
+compared once motions listed as hidden or weak are out of both; `weak` is the squared Mahalanobis distance of these over
+its mean, with the 99 % limit, `node` the 5th and 95th percentile, over the nodes, of scatter over sigma where not
+flagged. Fresh seeds start at `--first`: noise, gain and beliefs are new in each, the speckle in every third.
 """
 
 from __future__ import annotations
@@ -17,9 +19,11 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import chi2
 from spline_field import SplineField
 from stereo_trial import CASES, Setup, Trial, cover, error_of, modes_of, remover, rms
 
@@ -42,6 +46,7 @@ PLATE = 0.1  # medians of the stiffness of a node
 BANDS = (1.0, 5.0)  # mm from a step, of the nodes that tell its height
 HEIGHT = 0.04  # mm
 FEW = 30  # nodes, too few for a figure
+OFTEN = 0.75  # share of the seeds, in which a node tells its scatter
 HEAD = "    e  sigma     z  cover "
 METHODS = {
     "nodes": Correlate(pixels=PIXELS),
@@ -51,6 +56,7 @@ METHODS = {
     "halved twice": Correlate(pixels=PIXELS, splines=Splines(refine=2)),
     "CAD's knots, apart": Correlate(pixels=PIXELS, splines=Splines(continuity=0.0)),
 }
+SIZES = {"freeform": FreeformSizes(), "smooth": FreeformSizes(poles=(17, 4), degrees=(8, 3))}
 SPED = ("CAD's knots", "nodes")
 
 
@@ -59,9 +65,12 @@ def main() -> None:
     parser.add_argument("what", choices=("study", "step", "sigma", "speed", "faces"))
     parser.add_argument("folder", nargs="?", type=Path, help="of STEP and IGES files")
     parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--first", type=int, default=0, help="seed")
     parser.add_argument("--full", action="store_true", help="5 megapixels in place of a quarter of that")
     parser.add_argument("--element", type=float, default=2.7, help="mm")
+    parser.add_argument("--pixels", type=float, default=PIXELS, help="px for each evaluation point, of `sigma`")
     parser.add_argument("--where", choices=("inside", "outside"), help="deviations of `sigma`; default: both")
+    parser.add_argument("--part", choices=("freeform", "smooth", "milled"), help="of `sigma`; default: all")
     parser.add_argument("--cases", nargs="+", choices=tuple(CASES), default=["known"])
     chosen = parser.parse_args()
     if chosen.what == "faces":
@@ -70,11 +79,15 @@ def main() -> None:
     {"study": _study, "step": _step, "sigma": _sigma, "speed": _speed}[chosen.what](chosen)
 
 
+def _seeds(chosen: argparse.Namespace) -> range:
+    return range(chosen.first, chosen.first + chosen.seeds)
+
+
 def _study(chosen: argparse.Namespace) -> None:
     setup = Setup("smooth", full=chosen.full, element=chosen.element)
     for case in chosen.cases:
         rows: dict[str, list] = {}
-        for trial in setup.trials(CASES[case], range(chosen.seeds)):
+        for trial in setup.trials(CASES[case], _seeds(chosen)):
             for name in ("CAD's knots", "nodes", "nodes, plate"):
                 if name == "nodes, plate" and case != "known":
                     continue
@@ -114,7 +127,7 @@ def _step(chosen: argparse.Namespace) -> None:
     }
     print(f"height found of a step of {1e3 * HEIGHT:g} µm, nodes {BANDS[0]:g} to {BANDS[1]:g} mm away; mean over seeds")
     for words, (setup, at) in places.items():
-        for trial in setup.trials(CASES["known"], range(chosen.seeds)):
+        for trial in setup.trials(CASES["known"], _seeds(chosen)):
             for name in ("nodes", "CAD's knots, apart", "CAD's knots", "halved once", "halved twice"):
                 try:
                     shape, _ = _measured(METHODS[name], trial)
@@ -141,30 +154,60 @@ def _height(shape: Shape, at: float, values: Floats | None = None) -> tuple[floa
 
 
 def _sigma(chosen: argparse.Namespace) -> None:
-    sizes = {"freeform": FreeformSizes(), "smooth": FreeformSizes(poles=(17, 4), degrees=(8, 3))}
+    sizes = {part: SIZES[part] for part in SIZES if chosen.part in (None, part)}
     inside = {f"{part}, in their space": (part, SplineField.drawn(size, 0.03, 1)) for part, size in sizes.items()}
     outside = {
         "freeform, a bump of 12 mm": ("freeform", None),
         "freeform, a step of 40 µm": ("freeform", Step(HEIGHT, (50.0, 0.0, 0.0), (1.0, 0.0, 0.0))),
         "milled, steps at its borders": ("milled", None),
     }
+    outside = {words: what for words, what in outside.items() if chosen.part in (None, what[0])}
     chosen_ones = (inside if chosen.where != "outside" else {}) | (outside if chosen.where != "inside" else {})
-    print(f"{'':49s}{HEAD}  kappa flagged {HEAD} others {HEAD}")
+    print(f"{'':49s}{HEAD} flagged {HEAD} others {HEAD} weak (99 %)  node 5, 95  kappa settled")
     for words, (part, deviation) in chosen_ones.items():
         setup = Setup(part, full=chosen.full, element=chosen.element, deviation=deviation)
         for case in chosen.cases:
-            found: dict[str, list] = {}
-            for trial in setup.trials(CASES[case], range(chosen.seeds)):
+            found: dict[str, list[Told]] = {}
+            for trial in setup.trials(CASES[case], _seeds(chosen)):
                 for name in ("CAD's knots", "halved once", "halved twice")[: 1 if "in their" in words else 3]:
-                    found.setdefault(name, []).append(_told(METHODS[name], trial))
+                    found.setdefault(name, []).append(_told(replace(METHODS[name], pixels=chosen.pixels), trial))
             for name, rows in found.items():
-                error, sigma, flagged = (np.concatenate(column) for column in list(zip(*rows, strict=True))[:3])
-                kappa = np.mean([row[3] for row in rows])
-                print(
-                    f"{words:28s} {case:6s} {name:12s} {_scored(error, sigma)} {kappa:6.2f} {flagged.mean():7.3f} "
-                    f"{_scored(error[flagged], sigma[flagged])} {_scored(error[~flagged], sigma[~flagged])}",
-                    flush=True,
-                )
+                print(f"{words:28s} {case:6s} {name:12s} {_row(rows)}", flush=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """One map: errors and sigmas (n,) mm of the nodes of the mesh, NaN where there are none, and what is flagged.
+
+    Parameters
+    ----------
+    distance, modes : squared Mahalanobis distance of the motions listed as weak, and how many there are
+    """
+
+    error: Floats
+    sigma: Floats
+    flagged: Booleans
+    distance: float
+    modes: int
+    kappa: float
+    settled: bool
+
+
+def _row(rows: list[Told]) -> str:
+    errors, sigmas = (np.stack([getattr(row, field) for row in rows]) for field in ("error", "sigma"))
+    seen, flagged = np.isfinite(errors), np.stack([row.flagged for row in rows])
+    scores = [_scored(errors[some], sigmas[some]) for some in (seen, seen & flagged, seen & ~flagged)]
+    told = seen & ~flagged
+    often = told.mean(axis=0) >= OFTEN
+    squares, claims = (np.where(told, values, 0.0)[:, often] ** 2 for values in (errors, sigmas))
+    node = np.sqrt(squares.sum(axis=0) / claims.sum(axis=0))
+    low, high = np.percentile(node, [5, 95]) if often.any() else (np.nan, np.nan)
+    modes = sum(row.modes for row in rows)
+    weak = f"{sum(row.distance for row in rows) / modes:.2f} ({chi2.ppf(0.99, modes) / modes:.2f})" if modes else "-"
+    return (
+        f"{scores[0]} {flagged[seen].mean():7.3f} {scores[1]} {scores[2]} {weak:>16s} {low:5.2f} {high:.2f} "
+        f"{np.mean([row.kappa for row in rows]):6.2f} {sum(row.settled for row in rows):3d}/{len(rows)}"
+    )
 
 
 def _scored(error: Floats, sigma: Floats) -> str:
@@ -175,12 +218,22 @@ def _scored(error: Floats, sigma: Floats) -> str:
     return f"{1e3 * rms(error):6.2f} {1e3 * np.median(sigma):6.2f} {rms(z):5.2f} {cover(z):6.3f} "
 
 
-def _told(correlate: Correlate, trial: Trial) -> tuple[Floats, Floats, Booleans, float]:
-    """Return errors and sigmas of the sound nodes, which of them are flagged, and by how much residuals correlate."""
+def _told(correlate: Correlate, trial: Trial) -> Told:
     shape, _ = _measured(correlate, trial)
-    model = shape.uncertainty.model
+    model, sure, sound = shape.uncertainty.model, shape.uncertainty, shape.sound
     assert model is not None
-    return *_judged(shape, trial), model.missed[shape.sound], shape.uncertainty.correlated
+    of_nodes = np.full((2, len(shape.mesh)), np.nan)
+    of_nodes[:, shape.scene.node[sound]] = _judged(shape, trial)
+    flagged = np.zeros(len(shape.mesh), dtype=bool)
+    flagged[shape.scene.node] = model.missed
+    gauge, weak = modes_of(shape, trial)
+    distance = 0.0
+    if weak.shape[1]:
+        fields = weak * sound[:, None]
+        fields = fields - remover(gauge, sound).T @ (gauge.T @ fields)
+        sizes = fields.T @ error_of(shape, trial, shape.values)
+        distance = float(sizes @ np.linalg.solve(fields.T @ sure.covariance(fields), sizes))
+    return Told(*of_nodes, flagged, distance, weak.shape[1], sure.correlated, shape.settled)
 
 
 def _measured(correlate: Correlate, trial: Trial) -> tuple[Shape, float]:

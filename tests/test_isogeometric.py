@@ -7,13 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from inspect3d.camera import View
 from inspect3d.correlation.correlate import Correlate
+from inspect3d.correlation.freedom import Freedom, Lens
+from inspect3d.correlation.linear import gauge_of
 from inspect3d.correlation.space import EVERY_NODE
 from inspect3d.correlation.splines import Splines
 from inspect3d.nominal.load import load_nominal
 from inspect3d.nominal.nurbs import Nurbs
 from inspect3d.nominal.nurbs_face import write_step
 from inspect3d.outcome import MeasurementError
+from inspect3d.pose import Pose
 from tests.sheets import DEPTH, WIDTH, sheet, wave
 from tests.speckled import Speckle, photographed, picture, rig
 
@@ -138,6 +142,33 @@ def test_in_the_space_of_the_splines_hardly_any_node_is_flagged(series):
     assert np.mean([shape.uncertainty.model.missed.mean() for shape in series[0]]) < 0.03
     assert not any(shape.uncertainty.model.parted for shape in series[0])
     assert series[1][0].unresolved is None
+
+
+def believed(view, share, aside):
+    """Return a view that shows the sheet in about the same place with a focal length and a centre that are wrong."""
+    camera, pose = view.camera, view.camera_from_cad
+    matrix = camera.matrix * np.array([[share, 1, 1], [1, share, 1], [1, 1, 1]]) + np.array(
+        [[0, 0, aside]] + [[0.0] * 3] * 2
+    )
+    depth = pose.translation[2]
+    place = pose.translation + np.array([-aside * depth / camera.matrix[0, 0], 0, (share - 1) * depth])
+    return View(replace(camera, matrix=matrix), Pose(pose.rotation, place))
+
+
+def test_beside_unknown_cameras_splines_settle_on_the_shape_but_for_what_nothing_tells(nominal, views):
+    random = np.random.default_rng(3)
+    off = believed(views[0], 0.93, 40.0), believed(views[1], 0.95, -40.0)
+    freedom = Freedom("free", (Lens(0.05 * 2400, 20.0),) * 2, off, nominal.mesh.nodes.mean(axis=0))
+    grey = [photographed(random, exact) for exact in photographs(views, within)]
+    shape = Correlate(pixels=4.0, splines=Splines())(nominal, grey, off, freedom)
+    assert shape.settled
+    assert len(shape.state.steps) < 10
+    weak = [motion.pattern for motion in shape.hidden if np.isfinite(motion.sigma)]
+    modes = np.column_stack([gauge_of(shape.scene, freedom), *weak])
+    inverse = np.linalg.pinv(modes)
+    error = shape.values - within(*shape.scene.nodes[:, :2].T)
+    sigma = np.sqrt(shape.uncertainty.variances_without(modes, inverse))
+    assert rms((error - modes @ (inverse @ error)) / sigma) < 1.25
 
 
 @pytest.fixture(scope="module")
