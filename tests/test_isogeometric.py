@@ -190,7 +190,7 @@ def test_nodes_beside_a_step_are_flagged_as_unresolved(stepped):
     for shape in stepped:
         beside = np.abs(shape.mesh.nodes[:, 0] - 33.0) < 1.5
         assert shape.unresolved[beside & shape.observed].mean() > 0.95
-    away = np.abs(stepped[1].mesh.nodes[:, 0] - 33.0) > 20.0
+    away = np.abs(stepped[1].mesh.nodes[:, 0] - 33.0) > 25.0  # no control point there reaches the step
     assert stepped[1].unresolved[away].mean() < 0.1
 
 

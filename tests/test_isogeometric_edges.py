@@ -137,3 +137,9 @@ def test_a_sheet_with_holes_is_measured_and_its_surface_left_as_step(holed, numb
     feet = measured_face.points(measured_face.parameters(places))
     away = np.abs(((feet - places) * mesh.normals[seen]).sum(axis=1))
     assert (away < 5e-4 + 0.1 * part.deviation.sigma[seen]).all()
+
+
+def test_control_points_that_move_in_all_directions_miss_no_more_than_those_along_normals(holed):
+    normal, every = (part.unresolved[part.deviation.observed].mean() for part in holed[0].parts)
+    assert every <= normal + 0.01
+    assert every < 0.07

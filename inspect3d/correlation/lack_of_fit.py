@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,10 +17,11 @@ from inspect3d.correlation.linear import noise_of, slides_of, system_of
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.space import EVERY_NODE
+from inspect3d.correlation.spline_space import SplineSpace
 from inspect3d.correlation.system import System
 
 CHANCE = 0.01  # of noise making any node of a map stand out in any test
-BESIDE = 2.5, 3.0, 3.2  # standard uncertainties that do so beside such a node: of means, facets and bumps
+BESIDE = 3.0, 3.0, 3.2  # standard uncertainties that do so beside such a node: of means, facets and bumps
 ALONE = 3.5  # the same of a node by itself
 WIDTHS = (1, 2, 4)  # steps of averaging over neighbours that make bumps from a node
 AROUND = (1, 2)  # steps of averaging over neighbours, of the squares of facets
@@ -55,8 +56,10 @@ class Test:
 class LackOfFit:
     """The increment that nodes would make from a solution if each moved by itself, to first order.
 
-    Where the solution is as the part is, the increment is noise: its variance is that of the nodes by themselves less
-    that of the solution, since the solution's space is part of theirs. What goes beyond is an error of the model.
+    Where the solution is as the part is, the increment is noise. The solution Q⁻¹B'r has taken of the scores what its
+    motions push the nodes, G = J'W B, so that the variance of what is left is K - G Q⁻¹G', and that of the increment
+    K⁻¹ - R Q⁻¹R' with R = K⁻¹G, the motions as nodes by themselves would follow them. At a rim that is far from what
+    they move the nodes by. What goes beyond is an error of the model.
 
     Parameters
     ----------
@@ -66,7 +69,7 @@ class LackOfFit:
     left : the facets with the scores and the energy that are left after the increment
     noise : variance of the residuals that are left, grey levels², in `system`
     scores : (n,) 1/mm, J'W r of the nodes at the solution
-    stiffness : (n, n) 1/mm², their variance where the solution is as the part is and moves by nothing
+    blocks : (f, 3, 3) 1/mm², what the facets give K, the variance of the scores where the solution moves by nothing
     alone, precision : (f,) mm and 1/mm², how each facet by itself would move, and how sure that is
     """
 
@@ -76,13 +79,11 @@ class LackOfFit:
     left: Facets
     noise: float
     scores: Floats
-    stiffness: sparse.csr_matrix
+    blocks: Floats
     alone: Floats
     precision: Floats
 
-    def squared(
-        self, within: System, rows: sparse.csr_matrix, times: float, reach: Callable[[Booleans], Booleans]
-    ) -> tuple[Floats, Booleans]:
+    def squared(self, within: System, space: SplineSpace, times: float) -> tuple[Floats, Booleans]:
         """Return the squared size (n,) mm² of the error of the model, and the nodes (n,) that prove it.
 
         Of as many nodes as a map has some stand out by chance. So much as noise hardly ever reaches in any of them
@@ -92,11 +93,10 @@ class LackOfFit:
         Parameters
         ----------
         within : the system of the solution
-        rows : (n, k), from its motions to those of the nodes
+        space : its motions
         times : by how much the variance of the residuals is larger there
-        reach : returns the nodes that move together with some
         """
-        tests = tuple(self._tests(within, rows, times))
+        tests, reach = tuple(self._tests(within, space.pushes(self.scene, self.blocks), times)), space.sharing
         proof = float(norm.isf(CHANCE / 2 / len(tests) / len(self.increment)))
         most = np.max([test.beyond for test in tests], axis=0)
         proven = most > proof
@@ -125,43 +125,43 @@ class LackOfFit:
         return self.scene.adjacency + sparse.identity(len(self.increment), format="csr")
 
     @cached_property
+    def _stiffness(self) -> sparse.csr_matrix:
+        return self.scene.matrix(self.scene.assembled(self.blocks))
+
+    @cached_property
     def _around(self) -> sparse.csr_matrix:
         """Return averages over each node and its neighbours, (n, n)."""
         return sparse.diags(1 / np.asarray(self.near.sum(axis=1)).ravel()) @ self.near
 
-    def _tests(self, within: System, rows: sparse.csr_matrix, times: float) -> Iterator[Test]:
+    def _tests(self, within: System, pushes: Floats, times: float) -> Iterator[Test]:
         """Yield tests of the nodes by themselves, of means over neighbours, of bumps and of facets."""
-        around = self._around
+        around, followed = self._around, self.system.motion.solve(pushes)
         means, facets, bumps = BESIDE
-        yield self._moved(sparse.identity(len(self.increment), format="csr"), within, rows, times, ALONE)
-        yield self._moved(around, within, rows, times, means)
+        yield self._moved(sparse.identity(len(self.increment), format="csr"), within, followed, times, ALONE)
+        yield self._moved(around, within, followed, times, means)
         for width in WIDTHS:
-            yield self._missed(around**width, within, rows, times, bumps)
+            yield self._missed(around**width, within, pushes, times, bumps)
         for width in AROUND:
             yield self._restless(around**width, times, facets)
 
-    def _moved(
-        self, mean: sparse.csr_matrix, within: System, rows: sparse.csr_matrix, times: float, beside: float
-    ) -> Test:
+    def _moved(self, mean: sparse.csr_matrix, within: System, followed: Floats, times: float, beside: float) -> Test:
         """Return the test of means of the increment, (n, n), a row each."""
         size, whole = mean @ self.increment, times * self.system.variances(mean)
-        variance = np.maximum(whole - within.variances((mean @ rows).tocsr()), INDEPENDENT * whole)
+        taken = mean @ followed
+        variance = np.maximum(whole - (taken * within.covariance(taken.T).T).sum(axis=1), INDEPENDENT * whole)
         return Test(np.abs(size) / np.sqrt(variance), beside, np.maximum(size**2 - variance, 0.0), self._around)
 
-    def _missed(
-        self, bumps: sparse.csr_matrix, within: System, rows: sparse.csr_matrix, times: float, beside: float
-    ) -> Test:
+    def _missed(self, bumps: sparse.csr_matrix, within: System, pushes: Floats, times: float, beside: float) -> Test:
         """Return the test of what the solution misses on average over bumps (n, n), a row each.
 
         The increment's average over many nodes would need more of an inverse than its pattern. The scores s tell the
         same: a bump p has the score p's of the variance p'Kp, less what the motions of the solution take of it, and
         misses p's / p'K1 on average.
         """
-        pushed = self.stiffness @ bumps.T
-        stiff = np.asarray(bumps.T.multiply(pushed).sum(axis=0)).ravel()
-        taken = (rows.T @ pushed).toarray()
-        own = stiff - (taken * within.covariance(taken)).sum(axis=0)
-        scores, whole = bumps @ self.scores, bumps @ np.asarray(self.stiffness.sum(axis=1)).ravel()
+        stiff = np.asarray(bumps.multiply(bumps @ self._stiffness).sum(axis=1)).ravel()
+        taken = bumps @ pushes
+        own = stiff - (taken * within.covariance(taken.T).T).sum(axis=1) / times
+        scores, whole = bumps @ self.scores, bumps @ np.asarray(self._stiffness.sum(axis=1)).ravel()
         apart = (own > INDEPENDENT * stiff) & (whole > 0)
         beyond = np.divide(np.abs(scores), np.sqrt(times * np.where(apart, own, 1.0)), out=np.zeros(len(whole)))
         size = np.divide(scores, whole, out=np.zeros(len(whole)), where=apart)
@@ -206,8 +206,8 @@ def lack_of_fit(
     left = found.after(increment[scene.triangles], freedom.spread(columns)[0] @ cameras)
     before, noise = noise, noise_of(left, weights, unknowns)
     system = system_of(free, found, factors, noise, freedom, columns, scale, slides)
-    stiffness = scene.matrix(scene.assembled(found.node * (factors / noise)[:, None, None]))
+    blocks = found.node * (factors / noise)[:, None, None]
     whole = found.clean * found.node.sum(axis=(1, 2))
     alone = np.divide(found.right.sum(axis=1), whole, out=np.zeros(len(whole)), where=whole > 0)
     precision = weights * found.clean * whole / noise
-    return LackOfFit(free, increment, system, left, noise, scores * before / noise, stiffness, alone, precision)
+    return LackOfFit(free, increment, system, left, noise, scores * before / noise, blocks, alone, precision)

@@ -89,19 +89,18 @@ def model_error(
     assert isinstance(space, SplineSpace)
     scale, slides = freedom.scale(views, scene.sample), slides_of(scene, freedom, views)
     within = system_of(scene, found, weights * found.clean**2, noise, freedom, columns, scale, slides)
-    rows, times = space.rows(scene), noise / lack.noise
-    gaps = np.zeros(len(scene.nodes))
-    plain, sign = within.variances(rows), np.ones(len(scene.nodes))
+    times, gaps = noise / lack.noise, np.zeros(len(scene.nodes))
+    plain, sign = within.variances(space.rows(scene)), np.ones(len(scene.nodes))
     parted = parting(scene, found, views, weights, freedom, columns, noise)
     if parted is not None:
         gaps, sign = parted.squared(plain), np.sign(parted.motion)
         lack = lack_of_fit(scene, parted.left, views, weights, freedom, columns)
-        within, rows = parted.system, parted.rows
+        within, space = parted.system, parted.space
     strained = unresolved(scene, lack.left, noise, summed.fitted) ** 2
-    squared, proven = lack.squared(within, rows, times, space.sharing)
+    squared, proven = lack.squared(within, space, times)
     squared = np.maximum(squared, strained)
     missed = _around(lack, (squared > 0) | (gaps > plain))
-    uneven = _spread(lack, space.rows(scene) @ motion)
+    uneven = _spread(lack, scene.space.rows(scene) @ motion)
     on_step = _around(lack, (missed & summed.doubted) | _steps(lack, uneven, proven, summed.doubted))
     squared = np.maximum(squared, np.where(on_step, uneven, 0.0))
     missed |= on_step

@@ -29,12 +29,14 @@ class Parting:
     ----------
     motion : (n,) mm, of the nodes
     system : of the faces by themselves
-    rows : (n, k), from its motions to those of the nodes
+    space : its motions
+    rows : (n, k), from these to those of the nodes
     left : the facets with the scores and the energy that are left after the increment
     """
 
     motion: Floats
     system: System
+    space: SplineSpace
     rows: sparse.csr_matrix
     left: Facets
 
@@ -76,4 +78,4 @@ def parting(
     if chi2.sf(right @ motion, rows.shape[1] - space.rows(scene).shape[1]) > CHANCE:
         return None
     left = found.after(loose.space.at_corners(loose, motion), freedom.spread(columns)[0] @ cameras)
-    return Parting(rows @ motion, system, rows, left)
+    return Parting(rows @ motion, system, space.apart, rows, left)

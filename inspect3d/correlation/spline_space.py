@@ -90,13 +90,23 @@ class SplineSpace:
 
     def matrix(self, scene: Scene, blocks: Floats, stiffness: float) -> tuple[Matrix, Matrix]:
         """Return full matrices; a soft plate always stays, for control points that hardly anything shows."""
-        f = len(blocks)
-        spread = sparse.bsr_matrix((blocks, np.arange(f), np.arange(f + 1)), shape=(3 * f, 3 * f))
         median = typical(scene.gathered(np.einsum("fii->fi", blocks)))
         plate = median * (max(stiffness, SOFT) * scene.plate_of_motions + RIDGE * self._square)
-        found = _congruent(spread, self._packed)
+        found = _congruent(_in_blocks(blocks), self._packed)
         found = found if self.free is None else self.free.T @ found @ self.free
         return found + plate, plate
+
+    def pushes(self, scene: Scene, blocks: Floats) -> Floats:
+        """Return the scores (n, k) that a unit of each motion gives nodes which move by themselves.
+
+        Parameters
+        ----------
+        blocks : (f, 3, 3), the normal matrices of the facets' corners
+        """
+        corners, every = scene.triangles.ravel(), np.arange(3 * len(blocks))
+        gather = sparse.csr_matrix((np.ones(len(every)), (corners, every)), shape=(len(scene.nodes), len(every)))
+        of_points = gather @ (_in_blocks(blocks) @ self._corners)
+        return np.asarray(of_points.toarray() if self.free is None else of_points @ self.free)
 
     def factored(self, scene: Scene, matrix: Matrix) -> DenseFactor:
         """Return the full factor."""
@@ -168,6 +178,12 @@ class SplineSpace:
     def _square(self) -> Floats:
         """Return B'B."""
         return np.asarray((self._rows.T @ self._rows).toarray())
+
+
+def _in_blocks(blocks: Floats) -> sparse.bsr_matrix:
+    """Return a matrix of blocks (f, 3, 3) along its diagonal."""
+    f = len(blocks)
+    return sparse.bsr_matrix((blocks, np.arange(f), np.arange(f + 1)), shape=(3 * f, 3 * f))
 
 
 def _congruent(matrix: sparse.csr_matrix, rows: Matrix) -> Floats:
