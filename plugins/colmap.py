@@ -211,7 +211,7 @@ class Colmap:
                 *_left_out(source.photographs, placed),
                 remark,
                 _tie_words(tied),
-                *_centre_words(tied, rig),
+                *_centre_words(tied, rig, self.systematic),
                 _patch_words(patched, points, sigma, known),
                 NO_CUDA,
             ),
@@ -265,12 +265,12 @@ def _tie_words(tied: TiePoints) -> str:
     )
 
 
-def _centre_words(tied: TiePoints, rig: Rig | None) -> tuple[str, ...]:
+def _centre_words(tied: TiePoints, rig: Rig | None, systematic: float) -> tuple[str, ...]:
     """Return how well cameras that COLMAP placed are known against each other: parts of their distance to the part."""
     placed = [view for view in tied.views if view is not None]
     if len(placed) < FEWEST_CENTRES or (rig is not None and (rig.camera_from_cad or rig.camera_from_rig)):
         return ()
-    sigma = centre_sigma(tied, rig is None)
+    sigma = centre_sigma(tied, rig is None, systematic)
     sigma = sigma[np.isfinite(sigma)]
     middle = np.median(tied.points, axis=0)
     shares = 1e6 * sigma / np.array([np.linalg.norm(view.centre - middle) for view in placed])

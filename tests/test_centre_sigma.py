@@ -48,8 +48,22 @@ def changed(ties, x, size):
     return views, ties.points + x[VIEWS * size :].reshape(-1, 3)
 
 
-@pytest.mark.parametrize("free", [False, True])
-def test_centres_are_known_as_the_inverse_of_the_whole_normal_matrix_says(free):
+def shifts(ties):
+    """Return shifts of each picture, constant and linear in its pixels: all pixels' coordinates in a row, (n, 6 v)."""
+    columns = []
+    for k in range(VIEWS):
+        here = ties.view == k
+        away = ties.pixels[here] - ties.pixels[here].mean(axis=0)
+        for form in (np.ones(POINTS), *(away / away.std(axis=0)).T):
+            for axis in range(2):
+                column = np.zeros(ties.pixels.shape)
+                column[here, axis] = form / np.sqrt(3)
+                columns.append(column.ravel())
+    return np.stack(columns, axis=1)
+
+
+@pytest.mark.parametrize(("free", "shift"), [(False, 0.0), (True, 0.0), (False, 0.1), (True, 0.1)])
+def test_centres_are_known_as_the_inverse_of_the_whole_normal_matrix_says(free, shift):
     ties, size = tied(0.2), 9 if free else 6
     steps = np.concatenate(
         [np.tile([1e-5] * 3 + [1e-3] * 3 + ([1e-1, 1e-4, 1e-4] if free else []), VIEWS), [1e-3] * 3 * POINTS]
@@ -66,20 +80,22 @@ def test_centres_are_known_as_the_inverse_of_the_whole_normal_matrix_says(free):
     slopes, moves = (np.stack(columns, axis=1) / 2 for columns in zip(*both, strict=True))
     misses = ties.pixels.ravel() - pixels(np.zeros(len(steps)))
     noise = misses @ misses / (len(misses) - len(steps) + 7)
-    covariance = noise * moves @ np.linalg.pinv(slopes.T @ slopes, 1e-14, hermitian=True) @ moves.T
+    inverse = moves @ np.linalg.pinv(slopes.T @ slopes, 1e-14, hermitian=True)
+    by_shifts = shift * inverse @ slopes.T @ shifts(ties)
+    covariance = noise * inverse @ moves.T + by_shifts @ by_shifts.T
     away = np.array([view.centre for view in ties.views])
     away -= away.mean(axis=0)
     together = [np.cross(axis, away).ravel() for axis in np.eye(3)] + [np.tile(axis, VIEWS) for axis in np.eye(3)]
     basis = np.linalg.qr(np.stack([*together, away.ravel()], axis=1))[0]
     rest = np.eye(3 * VIEWS) - basis @ basis.T
     expected = np.sqrt(np.diag(rest @ covariance @ rest).reshape(-1, 3).mean(axis=1))
-    assert centre_sigma(ties, free) == pytest.approx(expected, rel=1e-3)
+    assert centre_sigma(ties, free, shift) == pytest.approx(expected, rel=1e-3)
 
 
 def test_the_uncertainty_grows_with_the_unit_and_cameras_that_were_not_placed_have_none():
     one, ten = tied(0.2), tied(0.2, 10.0)
-    assert centre_sigma(ten, True) == pytest.approx(10 * centre_sigma(one, True), rel=1e-4)
+    assert centre_sigma(ten, True, 0.01) == pytest.approx(10 * centre_sigma(one, True, 0.01), rel=1e-4)
     fewer = replace(one, views=(*one.views[:3], None))
     kept = fewer.view < 3
     fewer = replace(fewer, point=one.point[kept], view=one.view[kept], pixels=one.pixels[kept])
-    assert np.isnan(centre_sigma(fewer, False)).tolist() == [False, False, False, True]
+    assert np.isnan(centre_sigma(fewer, False, 0.01)).tolist() == [False, False, False, True]

@@ -15,12 +15,13 @@ SMALL = 1e-4
 NOTHING = 1e-13
 
 
-def centre_sigma(tied: TiePoints, free_lenses: bool) -> Floats:
+def centre_sigma(tied: TiePoints, free_lenses: bool, systematic: float) -> Floats:
     """Return the standard uncertainty of each camera's centre (v,), rms of three axes, in the unit of the views.
 
     It is NaN for cameras that were not placed, and tells how the centres lie against each other: a motion and a growth
     of all of them together do not count. All tie points are taken to be equally uncertain in the pictures, by as much
-    as they lie off on average, and independent; errors that many of them share are not in it.
+    as they lie off on average, and independent. What they share besides, since features look another way from aside, is
+    a shift of each picture, constant and linear in its pixels, of standard uncertainty `systematic` over its features.
 
     With the points eliminated, U - W V⁻¹ W' is the reduced camera matrix. It has seven motions without stiffness, which
     the map to the frame of the centres sends to zero, so that any generalised inverse serves.
@@ -28,6 +29,7 @@ def centre_sigma(tied: TiePoints, free_lenses: bool) -> Floats:
     Parameters
     ----------
     free_lenses : whether focal length and two radial terms of each lens were adjusted too
+    systematic : px, of each component of the shift of a picture
 
     Notes
     -----
@@ -37,22 +39,39 @@ def centre_sigma(tied: TiePoints, free_lenses: bool) -> Floats:
     placed = [(k, view) for k, view in enumerate(tied.views) if view is not None]
     size, points = POSE + len(LENS) * free_lenses, tied.points
     weight, squares = np.zeros((len(points), 3, 3)), 0.0
+    slopes = []
     reduced = np.zeros((len(placed) * size, len(placed) * size))
     cross = np.zeros((len(points), len(placed) * size, 3))
     for row, (k, view) in enumerate(placed):
         here = tied.view == k
         which, own = tied.point[here], np.arange(row * size, (row + 1) * size)
         by_point, by_camera = _slopes(view, points[which], free_lenses)
+        slopes.append((which, _shifts(tied.pixels[here]), by_point, by_camera))
         squares += float(((tied.pixels[here] - view.project(points[which])) ** 2).sum())
         np.add.at(weight, which, np.einsum("nra,nrb->nab", by_point, by_point))
         reduced[np.ix_(own, own)] = np.einsum("nra,nrb->ab", by_camera, by_camera)
         np.add.at(cross, (which[:, None], own[None]), np.einsum("nra,nrb->nab", by_camera, by_point))
-    reduced -= np.einsum("pia,pab,pjb->ij", cross, np.linalg.inv(weight), cross, optimize=True)
+    eliminated = np.einsum("pia,pab->pib", cross, np.linalg.inv(weight))
+    reduced -= np.einsum("pib,pjb->ij", eliminated, cross, optimize=True)
     noise = squares / max(2 * len(tied.pixels) - 3 * len(points) - len(reduced) + 7, 1)
     scale = 1 / np.sqrt(np.diag(reduced))
-    covariance = np.linalg.pinv(reduced * scale * scale[:, None], NOTHING, hermitian=True) * scale * scale[:, None]
-    shifts = (np.arange(len(placed))[:, None] * size + np.arange(3, POSE)).ravel()
-    return _against_each_other(noise * covariance[np.ix_(shifts, shifts)], placed, len(tied.views))
+    inverse = np.linalg.pinv(reduced * scale * scale[:, None], NOTHING, hermitian=True) * scale * scale[:, None]
+    common = []
+    for row, (which, shifts, by_point, by_camera) in enumerate(slopes):
+        pulls = -np.einsum("nib,nrb,nf->irf", eliminated[which], by_point, shifts, optimize=True)
+        pulls[row * size : (row + 1) * size] += np.einsum("nrc,nf->crf", by_camera, shifts)
+        common.append(systematic * inverse @ pulls.reshape(len(reduced), -1))
+    moved = np.concatenate(common, axis=1)
+    centres = (np.arange(len(placed))[:, None] * size + np.arange(3, POSE)).ravel()
+    covariance = (noise * inverse + moved @ moved.T)[np.ix_(centres, centres)]
+    return _against_each_other(covariance, placed, len(tied.views))
+
+
+def _shifts(pixels: Floats) -> Floats:
+    """Return shifts at pixels (n, 2) that are constant and linear in them, (n, 3), their squares one on average."""
+    away = pixels - pixels.mean(axis=0)
+    linear = away / np.sqrt(np.maximum((away**2).mean(axis=0), NOTHING))
+    return np.column_stack([np.ones(len(pixels)), linear]) / np.sqrt(3.0)
 
 
 def _against_each_other(covariance: Floats, placed: list[tuple[int, View]], count: int) -> Floats:
