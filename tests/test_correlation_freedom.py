@@ -7,14 +7,17 @@ import pytest
 from scipy import sparse
 
 from inspect3d.camera import View
+from inspect3d.correlation import solver
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.hidden import hidden_motions
-from inspect3d.correlation.linear import gauge_of, slides_of, system_of
+from inspect3d.correlation.linear import gauge_of, motions_of, moving_cameras, slides_of, system_of
 from inspect3d.correlation.normal import facets
 from inspect3d.correlation.picture import Pictures
 from inspect3d.correlation.scene import scene
-from inspect3d.correlation.still import in_gauge, stilled
+from inspect3d.correlation.still import SOFT, in_gauge, slid, stilled
+from inspect3d.correlation.systematic import Systematic
 from inspect3d.pose import Pose
+from inspect3d.register.gauge import FREE
 from tests.seen_sheets import ALL, STEEPEST, accumulated, flat_sheet, wavy_sheet
 from tests.sheets import plane, plane_normals, sheet
 from tests.speckled import Speckle, picture, rig
@@ -67,6 +70,35 @@ def test_two_free_projection_matrices_hide_fifteen_motions_that_priors_name():
     assert len(system.unseen) == 0
     told = sum(motion.prior for motion in hidden_motions(seen, system, free, 0.0))
     assert told > 7.5  # of eight; the elements say a little about the last
+
+
+def photographed_wave(views):
+    """Return the pictures of the sheet without noise."""
+    speckle = Speckle.drawn(np.random.default_rng(0), 0.7)
+    return Pictures([picture(view, speckle) for view in views])
+
+
+def test_a_step_that_is_taken_back_is_told_of_with_its_shift(wavy, monkeypatch):
+    monkeypatch.setattr(solver, "WORSE", 0.0)
+    _, views, seen, _ = wavy
+    free = Freedom("free", (Lens(30.0, 10.0),) * 2, tuple(views), seen.centre)
+    solve = solver.Solver((solver.Level(0, 0, 3),), systematic=Systematic(0.02, 15.0))
+    state = solve(seen, photographed_wave(views), views, free)
+    assert len(state.steps) == 1
+    assert state.shift.any()
+
+
+def test_slides_that_are_held_stay_where_they_started(wavy):
+    _, views, seen, _ = wavy
+    free = Freedom("free", (Lens(),) * 2, tuple(views), seen.centre)
+    _, values, right = motions_of(seen, free)
+    soft = moving_cameras(seen, free, views, right[values**2 <= SOFT * values[0] ** 2])
+    assert soft.shape[1] > 0
+    off = free.moved(views, 0.5 * soft[:, 0])
+    level, pictures = solver.Level(3, 0, 8, "poses"), photographed_wave(views)
+    back, stays = (solver.Solver((level,), slides=share)(seen, pictures, off, free).views for share in (FREE, SOFT))
+    assert slid(seen, views, back) < 0.3 * slid(seen, views, off)
+    assert slid(seen, off, stays) < 0.1 * slid(seen, views, off)
 
 
 def test_a_stilled_step_slides_no_more_than_it_must_and_shows_the_same_disparities(wavy):

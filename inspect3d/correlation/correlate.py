@@ -20,7 +20,7 @@ from inspect3d.correlation.shape import Shape
 from inspect3d.correlation.shift import needed_columns
 from inspect3d.correlation.solver import COARSE, ON_NOMINAL, Level, Solver, State, Step, held
 from inspect3d.correlation.splines import Splines
-from inspect3d.correlation.still import in_gauge
+from inspect3d.correlation.still import SOFT, in_gauge, slid
 from inspect3d.correlation.systematic import Systematic
 from inspect3d.correlation.texture import speckle_size
 from inspect3d.correlation.uncertainty import uncertainty
@@ -35,7 +35,8 @@ SPLINES = (SHAPE[0], SHAPE[1], SHAPE[3])
 """Ways from coarse to fine: shape alone, cameras and shape together, the paper's two steps; and splines alone.
 
 Of cameras and shape together only the poses are brought near the nominal shape first: lenses that take its true
-deviations for errors of their own would run far off their priors.
+deviations for errors of their own would run far off their priors. Before a shape that is nearly a plane the poses may
+run off as well, along the plane: then they are sought again with such slides held.
 """
 
 NOISY = 25.0
@@ -43,6 +44,7 @@ STEEPEST_TILT = 0.2
 ENOUGH = 0.3
 FRAYED, CLEAR = 3.0, 0.999
 ROUNDS = 5
+FARTHEST = 12.0  # px, twice the first blur: no start that leads anywhere is off by so much
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,8 @@ class Correlate:
         coarse = levels[:-1] if freedom.unknowns else levels
         calibrating = tuple(takewhile(lambda level: level.moves in ON_NOMINAL, coarse))
         state = Solver(calibrating, COARSE)(seen, pictures, views, freedom, told=told)
+        if slid(seen, views, state.views) > FARTHEST:
+            state = Solver(calibrating, COARSE, slides=SOFT)(seen, pictures, views, freedom, told=told)
         calibrated = state.views if calibrating else None
         state = Solver(coarse[len(calibrating) :])(seen, pictures, state.views, freedom, told=told)
         fine = Solver(levels[-1:], systematic=self.systematic)

@@ -43,15 +43,19 @@ def gauge_of(scene: Scene, freedom: Freedom) -> Floats:
     return left[:, values**2 > FREE * values[0] ** 2]
 
 
-def slides_of(scene: Scene, freedom: Freedom, views: Sequence[View]) -> Floats:
+def slides_of(scene: Scene, freedom: Freedom, views: Sequence[View], share: float = FREE) -> Floats:
     """Return the changes of the cameras (m, s) that only let the surface slide in itself.
 
     The pictures say nothing about them, whatever stiffness the facets of the mesh seem to give them: they are held.
+
+    Parameters
+    ----------
+    share : of the stiffest motion's stiffness, below which a motion is taken for a slide
     """
     if freedom.poses == "known":
         return np.zeros((freedom.unknowns, 0))
     _, values, right = motions_of(scene, freedom)
-    return moving_cameras(scene, freedom, views, right[values**2 <= FREE * values[0] ** 2])
+    return moving_cameras(scene, freedom, views, right[values**2 <= share * values[0] ** 2])
 
 
 def moving_cameras(scene: Scene, freedom: Freedom, views: Sequence[View], motions: Floats) -> Floats:

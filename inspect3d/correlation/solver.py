@@ -23,6 +23,7 @@ from inspect3d.correlation.space import Factored, Matrix
 from inspect3d.correlation.still import stilled
 from inspect3d.correlation.systematic import Systematic
 from inspect3d.outcome import MeasurementError
+from inspect3d.register.gauge import FREE
 from inspect3d.register.mobility import spread
 
 SHORTER, LONGER, LEAST, PATIENCE = 0.5, 1.2, 0.02, 4
@@ -107,6 +108,8 @@ class Solver:
     tolerance : mm; the last level ends when no node moves farther in a step, or by more than half a per cent of the
         uncertainty that unknown cameras give the shape; the others at half a micrometre, times the pixels of the blur.
         Where the nodes do not move by themselves it takes a tenth of a micrometre, and three
+    slides : share of the stiffest motion's stiffness below which a motion of the part before a shape that is held is
+        taken for a slide of the surface in itself, and held
 
     After four steps of a level, one that turns back is halved, and so are the next until they go on: where the
     pictures show a motion weakly, a full step goes too far and the next comes back. The robust weights of the facets
@@ -117,6 +120,7 @@ class Solver:
     levels: tuple[Level, ...]
     tolerance: float = 1e-5
     systematic: Systematic | None = None
+    slides: float = FREE
 
     def __call__(
         self,
@@ -192,7 +196,9 @@ class Solver:
                 continue
             sure = 0.0
             if freedom.unknowns or level.moves in ON_NOMINAL:
-                shape, cameras, shift, sure = _step(scene, found, noise, state, freedom, level, columns, known)
+                shape, cameras, shift, sure = _step(
+                    scene, found, noise, state, freedom, level, columns, known, self.slides
+                )
             else:
                 cameras, shift = np.zeros((2, 0))
                 shape, similar = _step_of_shape(scene, found, noise, state, level, similar)
@@ -210,14 +216,10 @@ class Solver:
             step = Step(level, change, float(np.sqrt(noise)))
             told(step)
             weights = robust(found) if count < PATIENCE else state.weights
+            settled = change < max(tolerance, SETTLED * sure)
+            state = replace(state, steps=(*state.steps, step), settled=settled, shift=shift)
             stride = _Stride(state, rows, shape, cameras, noise)
-            state = replace(
-                stride(freedom, factor),
-                weights=weights,
-                steps=(*state.steps, step),
-                settled=change < max(tolerance, SETTLED * sure),
-                shift=shift,
-            )
+            state = replace(stride(freedom, factor), weights=weights)
             if state.settled:
                 break
             last = shape
@@ -227,7 +229,7 @@ class Solver:
 
 @dataclass(frozen=True, eq=False)
 class _Stride:
-    """A step from a state, and the variance of the residuals there."""
+    """A step from a state, which it is told of already, and the variance of the residuals there."""
 
     state: State
     rows: sparse.csr_matrix
@@ -257,6 +259,7 @@ def _step(
     level: Level,
     columns: Integers,
     known: Shift | None,
+    share: float,
 ) -> tuple[Floats, Floats, Floats, float]:
     """Return the step of shape and cameras, the shift, and the rms uncertainty (mm) that the cameras give the shape.
 
@@ -264,9 +267,11 @@ def _step(
     ----------
     columns : camera parameters of each view in `found`
     known : of a smooth shift of the pictures, which is found along with the cameras and anew in each step
+    share : below which motions before a shape that is held are slides, see `Solver`
     """
     mixing, sigmas = freedom.spread(columns)
-    scale, slides = freedom.scale(state.views, scene.sample), slides_of(scene, freedom, state.views)
+    scale = freedom.scale(state.views, scene.sample)
+    slides = slides_of(scene, freedom, state.views, share if level.moves in ON_NOMINAL else FREE)
     camera_right = mixing.T @ found.camera_right / noise - freedom.offset(state.views) / sigmas**2
     if level.moves in ON_NOMINAL:
         matrix = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)

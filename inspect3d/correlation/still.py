@@ -58,6 +58,12 @@ def stilled(
     return shape + fields @ sizes, cameras + changes @ sizes
 
 
+def slid(scene: Scene, start: Sequence[View], views: Sequence[View]) -> float:
+    """Return how far the part has moved in the mean of the pictures, rms over its nodes, px."""
+    moved = [now.project(scene.sample) - then.project(scene.sample) for then, now in zip(start, views, strict=True)]
+    return float(np.sqrt((np.mean(moved, axis=0) ** 2).sum(axis=1).mean()))
+
+
 def in_gauge(
     scene: Scene, freedom: Freedom, views: Sequence[View], deviation: Floats
 ) -> tuple[tuple[View, ...], Floats]:
