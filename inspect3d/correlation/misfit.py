@@ -56,7 +56,7 @@ def misfit(scene: Scene, found: Facets, weights: Floats, system: System, mixing:
     sums = [np.bincount(corners, np.repeat(values, 3), minlength=n) for values in (squares, expected, spread)]
     known = sums[2] > 0
     ratio = np.divide(sums[0], sums[1], out=np.zeros(n), where=known)
-    degrees = np.divide(sums[1] ** 2, sums[2], out=np.ones(n), where=known)
+    degrees = np.maximum(1.0, np.divide(sums[1] ** 2, sums[2], out=np.ones(n), where=known))
     beyond = ratio * degrees / chi2.isf(CHANCE, degrees)
     usual = max(1.0, float(np.percentile(ratio[scene.triangles].max(axis=1)[counted], FITTING)))
     worst = beyond[scene.triangles].max(axis=1)
