@@ -57,7 +57,9 @@ def _pulled(shape: Shape, freedom: Freedom) -> tuple[str, ...]:
         return ()
     return (
         f"The pictures move the {freedom.names[int(np.argmax(pulls))]} by {pulls.max():.0f} standard uncertainties "
-        "from what was known of it: the cameras are known less well than is stated.",
+        "from what was known of it: the cameras are known less well than is stated, or the shape has steps that the "
+        "elements miss, which pull at cameras. Then the map is wrong by more than it says: give lenses that are "
+        "calibrated, or smaller elements.",
     )
 
 
