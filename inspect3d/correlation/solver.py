@@ -287,8 +287,7 @@ def _step(
     system = system_of(scene, found, factors, noise, freedom, columns, scale, slides, level.stiffness, blocks)
     shape, together = system.solve(_equations(scene, found, noise, state, level)[1], camera_right)
     cameras, shift = np.split(together, [len(sigmas)])
-    slides_free = freedom.poses != "known" and not scene.space.confined  # splines do not follow what slides in itself
-    if slides_free and level.blur == 0:  # the blurred pictures have shown where the surface lies
+    if freedom.poses != "known" and level.blur == 0:  # the blurred pictures have shown where the surface lies
         shape, cameras = stilled(scene, freedom, state.views, state.deviation, shape, cameras)
     by_cameras = (scene.space.rows(scene) @ system.following @ system.factor_by_cameras)[scene.whole]
     return shape, cameras, shift, float(np.sqrt((by_cameras**2).sum() / max(len(by_cameras), 1)))

@@ -14,6 +14,7 @@ from inspect3d.correlation.scene import SAMPLE, Scene
 from inspect3d.register.gauge import FREE
 
 SOFT = 0.1  # share of the stiffest motion's stiffness; a motion that moves the surface in itself mostly has less
+FOLLOWED = 0.1  # of the motions in which the surface slides in itself: a space that misses less nearly has them
 SMALL = 1e-3  # mm, or of a motion of the part
 
 
@@ -27,12 +28,19 @@ def stilled(
     pictures show weakly slide the surface through them by many pixels: over noise that is another every time, and over
     the outline of the part. Here the motions that move the surface in itself mostly are chosen such that its points
     stay where they are in the mean of the pictures, as far as they can and the scene's space has such motions.
+
+    A space that has none holds such motions of the part by this, where they started. One that follows them but for a
+    few per cent, as splines do on a smooth sheet, would take steps for ever that its gauge takes back: there the step
+    is returned as it is.
     """
     left, values, right = motions_of(scene, freedom)
     soft = values**2 <= SOFT * values[0] ** 2
     if not soft.any():
         return shape, cameras
-    rows, fields = scene.space.rows(scene), scene.space.motion(scene, -(left * values)[:, soft])
+    rows, slides = scene.space.rows(scene), -(left * values)[:, soft]
+    fields = scene.space.motion(scene, slides)
+    if scene.space.confined and np.linalg.norm(rows @ fields - slides) < FOLLOWED * np.linalg.norm(slides):
+        return shape, cameras
     changes = moving_cameras(scene, freedom, views, right[soft])
     some = slice(None, None, 1 + len(scene.nodes) // SAMPLE)
     rows = rows[some]
