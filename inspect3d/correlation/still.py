@@ -37,9 +37,9 @@ def stilled(
     soft = values**2 <= SOFT * values[0] ** 2
     if not soft.any():
         return shape, cameras
-    rows, slides = scene.space.rows(scene), -(left * values)[:, soft]
-    fields = scene.space.motion(scene, slides)
-    if scene.space.confined and np.linalg.norm(rows @ fields - slides) < FOLLOWED * np.linalg.norm(slides):
+    rows, sliding = scene.space.rows(scene), -(left * values)[:, soft]
+    fields = scene.space.motion(scene, sliding)
+    if scene.space.confined and np.linalg.norm(rows @ fields - sliding) < FOLLOWED * np.linalg.norm(sliding):
         return shape, cameras
     changes = moving_cameras(scene, freedom, views, right[soft])
     some = slice(None, None, 1 + len(scene.nodes) // SAMPLE)
