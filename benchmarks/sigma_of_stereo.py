@@ -128,7 +128,7 @@ def _score(settings: Correlate, trial: Trial, element: float) -> Score:
     for modes in (both, gauge):
         free = np.eye(len(naive)) - modes @ remover(modes, away)
         claims += [free @ naive, np.sqrt(np.einsum("ij,jk,ik->i", free, covariance, free))]
-    share = shape.scene.share >= 1
+    whole = shape.scene.own & (shape.scene.share >= 1)
     everywhere = np.full((8, len(shape.mesh)), np.nan)
     columns = (raw, raw_sigma, rest, rest_sigma, *claims)
     everywhere[:, shape.scene.node[sound]] = np.stack(columns)[:, sound]
@@ -137,7 +137,7 @@ def _score(settings: Correlate, trial: Trial, element: float) -> Score:
         distance,
         weak.shape[1],
         trial.near_step(shape.mesh.nodes, element),
-        float(sound[share & ~shape.mesh.crease[shape.scene.node]].mean()),
+        float(sound[whole & ~shape.mesh.crease[shape.scene.node]].mean()),
         shape.settled,
         shape.uncertainty.correlated,
         seconds,

@@ -15,6 +15,7 @@ from inspect3d.arrays import Booleans, Floats
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.linear import gauge_of
+from inspect3d.correlation.scene import Scene as SeenScene
 from inspect3d.correlation.shape import Shape
 from inspect3d.nominal.load import load_nominal
 from inspect3d.nominal.nominal import Nominal
@@ -28,6 +29,7 @@ from inspect3d.virtual.stereo_rig import StereoRig
 from inspect3d.virtual.warp import Warp
 
 SAME_SPECKLE = 3
+HAIR = 1e-3  # mm, or of the way to the facets around a node
 
 
 @dataclass(frozen=True)
@@ -66,9 +68,27 @@ class Trial:
         """Tell which nodes (n, 3) lie within `reach` mm of a place where the deviation of the milled block jumps."""
         if self.dataset.part.name != "milled":
             return np.zeros(len(nodes), dtype=bool)
+        return (np.abs(nodes[:, :1] - self._jumps) < reach).any(axis=1)
+
+    def on_side_of(self, feet: Floats, scene: SeenScene) -> Floats:
+        """Return feet (n, 3) on the surface, those that have crossed a step from the facets around their node put back.
+
+        The material at a node may be a hair beside it, and across a step from where the node is.
+        """
+        if self.dataset.part.name != "milled":
+            return feet
+        middles = scene.nodes[scene.triangles].mean(axis=1)
+        around = scene.gathered(np.ones((len(middles), 3)))
+        towards = scene.gathered(np.repeat(middles[:, None], 3, axis=1)) / around[:, None] - scene.nodes
+        bounds = np.array([-np.inf, *self._jumps, np.inf])
+        place = np.searchsorted(self._jumps, (scene.nodes + HAIR * towards)[:, 0])
+        x = np.clip(feet[:, 0], bounds[place] + HAIR, bounds[place + 1] - HAIR)
+        return np.column_stack([x, feet[:, 1:]])
+
+    @property
+    def _jumps(self) -> Floats:
         sizes = MilledSizes()
-        jumps = np.array([*sizes.facet_borders, sizes.section_start])
-        return (np.abs(nodes[:, :1] - jumps) < reach).any(axis=1)
+        return np.array([*sizes.facet_borders, sizes.section_start])
 
 
 @dataclass(frozen=True)
@@ -191,7 +211,9 @@ def error_of(shape: Shape, trial: Trial, values: Floats) -> Floats:
     found = shape.scene.nodes + values[:, None] * shape.scene.normals
     measured = _triangulated(trial.truth, [view.project(found) for view in shape.views], found)
     feet = trial.nominal.surface.closest(measured)
-    away = ((measured - feet.points) * feet.normals).sum(axis=1) - trial.dataset.deviation(feet.points)
+    away = ((measured - feet.points) * feet.normals).sum(axis=1) - trial.dataset.deviation(
+        trial.on_side_of(feet.points, shape.scene)
+    )
     return away + ((found - measured) * shape.scene.normals).sum(axis=1)
 
 

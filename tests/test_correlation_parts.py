@@ -7,6 +7,7 @@ import pytest
 from scipy import sparse
 from scipy.ndimage import gaussian_filter, spline_filter
 
+from inspect3d.correlation.cells import whole_facets
 from inspect3d.correlation.conjugate import conjugate
 from inspect3d.correlation.evaluation import centres, evaluation_points, points_per_edge
 from inspect3d.correlation.factor import Ordering
@@ -70,9 +71,9 @@ def test_lifted_points_lie_on_the_surface_and_flat_ones_off_it_by_a_chord_that_f
     for edge in (3.0, 1.5):
         nominal = sheet(edge=edge, fine=0.25)
         every = np.full(len(nominal.mesh.triangles), 4)
-        lifted = evaluation_points(nominal, every)
+        lifted, _ = evaluation_points(nominal, every)
         assert np.abs(nominal.surface.closest(lifted.places).distance).max() < 1e-9
-        chords.append(evaluation_points(nominal, every, lifted=False).chord)
+        chords.append(evaluation_points(nominal, every, lifted=False)[0].chord)
     assert chords[0] / chords[1] == pytest.approx(4.0, rel=0.25)
 
 
@@ -88,7 +89,8 @@ def test_a_facet_has_as_many_points_as_its_picture_has_room_for(flat):
 
 def test_what_a_plate_in_front_of_the_part_hides_is_not_seen_by_that_camera(flat):
     nominal, views, _ = flat
-    points = evaluation_points(nominal, np.full(len(nominal.mesh.triangles), 4))
+    points, _ = evaluation_points(nominal, np.full(len(nominal.mesh.triangles), 4))
+    every = whole_facets(nominal.mesh, points)
     middle = 0.5 * (views[0].centre + np.array([20.0, 20.0, 0.0]))
     corners = middle + np.array([[-6.0, -6, 0], [6, -6, 0], [6, 6, 0], [-6, 6, 0]])
     surface = nominal.surface
@@ -96,8 +98,8 @@ def test_what_a_plate_in_front_of_the_part_hides_is_not_seen_by_that_camera(flat
         np.concatenate([surface.vertices, corners]),
         np.concatenate([surface.triangles, np.array([[0, 1, 2], [0, 2, 3]]) + len(surface.vertices)]),
     )
-    hidden = visibility(Nominal("hidden", both, nominal.mesh), points, views, STEEPEST, [None, None])
-    free = visibility(nominal, points, views, STEEPEST, [None, None])
+    hidden = visibility(Nominal("hidden", both, nominal.mesh), every, views, STEEPEST, [None, None])
+    free = visibility(nominal, every, views, STEEPEST, [None, None])
     shadow = (
         views[0].centre
         + (points.places - views[0].centre)
@@ -112,10 +114,11 @@ def test_what_a_plate_in_front_of_the_part_hides_is_not_seen_by_that_camera(flat
 
 def test_what_is_masked_in_one_picture_is_not_used(flat):
     nominal, views, _ = flat
-    points = evaluation_points(nominal, np.full(len(nominal.mesh.triangles), 4))
+    points, _ = evaluation_points(nominal, np.full(len(nominal.mesh.triangles), 4))
+    every = whole_facets(nominal.mesh, points)
     mask = np.ones((480, 620), bool)
     mask[:, :300] = False
-    used = visibility(nominal, points, views, STEEPEST, [None, mask]).used
+    used = visibility(nominal, every, views, STEEPEST, [None, mask]).used
     assert used.any()
     assert (views[1].project(points.places[used])[:, 0] >= 299.5).all()
 
@@ -218,8 +221,9 @@ def test_the_kernels_say_the_same_with_the_compiler_on_and_off():
 
 def test_points_near_the_outline_of_the_part_are_not_used(flat):
     nominal, views, _ = flat
-    points = evaluation_points(nominal, np.full(len(nominal.mesh.triangles), 12))
-    used = visibility(nominal, points, views, STEEPEST, [None, None]).used
+    points, _ = evaluation_points(nominal, np.full(len(nominal.mesh.triangles), 12))
+    every = whole_facets(nominal.mesh, points)
+    used = visibility(nominal, every, views, STEEPEST, [None, None]).used
     rim = np.concatenate([np.stack([np.linspace(0, 60, 500), np.full(500, y), np.zeros(500)], 1) for y in (0.0, 45.0)])
     for view in views:
         near, edge = view.project(points.places[used]), view.project(rim)

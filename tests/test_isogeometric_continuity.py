@@ -30,7 +30,7 @@ def whole_scene(nominal, numbers):
     face = nominal.surface_face[nominal.surface.closest(mesh.nodes[mesh.triangles].mean(axis=1)).triangle]
     kept = np.flatnonzero(np.isin(face, numbers))
     node, triangles = np.unique(mesh.triangles[kept], return_inverse=True)
-    every = evaluation_points(nominal, np.full(len(mesh.triangles), EDGE))
+    every, _ = evaluation_points(nominal, np.full(len(mesh.triangles), EDGE))
     there, starts = np.isin(every.facet, kept), EDGE**2 * np.arange(len(kept) + 1)
     return Scene(
         mesh.nodes[node],
@@ -39,6 +39,8 @@ def whole_scene(nominal, numbers):
         replace(every, places=every.places[there], shapes=every.shapes[there], starts=starts),
         np.ones((len(kept), 2), dtype=bool),
         node,
+        np.zeros(len(node), dtype=np.int64),
+        np.ones(len(node), dtype=bool),
         kept,
         np.ones(len(node)),
     ), face[kept]

@@ -119,10 +119,8 @@ class Correlate:
         fine = Solver(levels[-1:], systematic=self.systematic)
         last = freedom if levels[-1].moves == "both" else held(freedom)
         if freedom.unknowns:  # the cameras have moved, and with them the outline of the part in the pictures
-            deviation = np.zeros(len(nominal.mesh))
-            deviation[seen.node] = state.deviation
-            seen = self._scene(nominal, state.views, masks)
-            state = fine(seen, pictures, state.views, freedom, deviation[seen.node], told)
+            before, seen = seen, self._scene(nominal, state.views, masks)
+            state = fine(seen, pictures, state.views, freedom, seen.carried(before, state.deviation), told)
         found = self._found(seen, pictures, state, last)
         for _ in range(ROUNDS):
             good = self._good(seen, found) & (seen.tilt(state.deviation) <= STEEPEST_TILT)
@@ -150,7 +148,16 @@ class Correlate:
 
     def _scene(self, nominal: Nominal, views: Sequence[View], masks: Sequence[Booleans | None] | None) -> Scene:
         masks = masks or [None] * len(views)
-        seen = scene(nominal, views, self.pixels, np.radians(self.steepest), masks, self.per_edge, self.lifted)
+        seen = scene(
+            nominal,
+            views,
+            self.pixels,
+            np.radians(self.steepest),
+            masks,
+            self.per_edge,
+            self.lifted,
+            self.splines is None,
+        )
         return seen if self.splines is None else self.splines(nominal, seen)
 
     def _found(self, seen: Scene, pictures: Pictures, state: State, freedom: Freedom) -> Facets:

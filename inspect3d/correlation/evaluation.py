@@ -10,6 +10,7 @@ import numpy as np
 from inspect3d.arrays import Floats, Integers, floats, integers
 from inspect3d.camera import View
 from inspect3d.nominal.nominal import InspectionMesh, Nominal
+from inspect3d.nominal.surface import Feet
 
 LEAST_THINNED = 9
 
@@ -57,8 +58,10 @@ class EvaluationPoints:
         return np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
 
 
-def evaluation_points(nominal: Nominal, per_edge: Integers, lifted: bool = True) -> EvaluationPoints:
-    """Return n² points in each facet: the centres of the n² triangles into which n parts of each edge cut it.
+def evaluation_points(nominal: Nominal, per_edge: Integers, lifted: bool = True) -> tuple[EvaluationPoints, Feet]:
+    """Return n² points in each facet, and where they are on the nominal surface.
+
+    They are the centres of the n² triangles into which n parts of each edge cut the facet.
 
     Parameters
     ----------
@@ -76,8 +79,8 @@ def evaluation_points(nominal: Nominal, per_edge: Integers, lifted: bool = True)
     places = interpolated(starts, shapes, mesh.triangles, mesh.nodes)
     feet = nominal.surface.closest(places)
     if lifted:
-        return EvaluationPoints(feet.points, shapes, starts)
-    return EvaluationPoints(places, shapes, starts, chord=float(np.abs(feet.distance).max()))
+        return EvaluationPoints(feet.points, shapes, starts), feet
+    return EvaluationPoints(places, shapes, starts, chord=float(np.abs(feet.distance).max())), feet
 
 
 def interpolated(starts: Integers, shapes: Floats, triangles: Integers, values: Floats, unit: bool = False) -> Floats:

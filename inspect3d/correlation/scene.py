@@ -11,6 +11,7 @@ from scipy import sparse
 
 from inspect3d.arrays import Booleans, Floats, Integers, unit
 from inspect3d.camera import View
+from inspect3d.correlation.cells import SMALLEST, cut_facets, whole_facets
 from inspect3d.correlation.evaluation import EvaluationPoints, evaluation_points, points_per_edge
 from inspect3d.correlation.factor import Ordering
 from inspect3d.correlation.space import EVERY_NODE, Space
@@ -26,7 +27,7 @@ SAMPLE = 200
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Facets that at least two cameras see, their nodes and the evaluation points that count.
+    """Facets, or what a cut leaves of them, that at least two cameras see, their nodes and the points that count.
 
     Parameters
     ----------
@@ -34,7 +35,9 @@ class Scene:
     triangles : (f, 3) indices into them
     points : that every view taking part sees
     taking : (f, v), the views that see the facet
-    node : (n,) number of each node in the inspection mesh
+    node : (n,) number of each node in the inspection mesh, where it may be there more than once, see `Cells`
+    sheet : (n,) number of the sheet of the CAD that each node moves with
+    own : (n,), whether the node of the inspection mesh lies on it; true once for each
     facet : (f,) number of each facet there
     share : (n,) how much of the evaluation points around a node counts
     space : how the nodes may move
@@ -46,6 +49,8 @@ class Scene:
     points: EvaluationPoints
     taking: Booleans
     node: Integers
+    sheet: Integers
+    own: Booleans
     facet: Integers
     share: Floats
     space: Space = EVERY_NODE
@@ -195,11 +200,21 @@ class Scene:
             points,
             self.taking[kept],
             self.node[node],
+            self.sheet[node],
+            self.own[node],
             self.facet[kept],
             (self.share * after / before)[node],
             self.space.restricted(node, kept),
         )
         return rest, node
+
+    def carried(self, other: Scene, deviation: Floats) -> Floats:
+        """Return the deviation (n,) that nodes of another scene of the same mesh have, (m,); zero where it has none."""
+        count = 1 + max(self.sheet.max(), other.sheet.max())
+        here, there = (scene.node * count + scene.sheet for scene in (self, other))
+        at = np.searchsorted(there, here)
+        at[at == len(there)] = 0
+        return np.where(there[at] == here, deviation[at], 0.0)
 
     def smoother(self, weights: Floats) -> sparse.csr_matrix:
         """Return T = (I + M_lumped⁻¹ M) / 2 with the mass matrices of the facets weighted by `weights` (f,).
@@ -228,6 +243,7 @@ def scene(
     masks: Sequence[Booleans | None],
     per_edge: int | None = None,
     lifted: bool = True,
+    cut: bool = True,
 ) -> Scene:
     """Return what the views see of a part.
 
@@ -238,6 +254,7 @@ def scene(
     masks : of each view, True where its picture may be used, or None
     per_edge : evaluation points along the edge of every facet, in place of `pixels`
     lifted : points on the nominal surface; else on the flat facets
+    cut : facets cut where sheets of the CAD end
 
     Raises
     ------
@@ -246,29 +263,34 @@ def scene(
     """
     mesh = nominal.mesh
     count = points_per_edge(mesh, views, pixels) if per_edge is None else np.full(len(mesh.triangles), per_edge)
-    points = evaluation_points(nominal, count, lifted)
-    see = visibility(nominal, points, views, steepest, masks)
-    facet = points.facet
-    counts = np.bincount(facet[see.used], minlength=len(mesh.triangles))
-    kept = np.flatnonzero(counts >= FEWEST)
+    points, feet = evaluation_points(nominal, count, lifted)
+    cells = cut_facets(nominal, points, feet) if cut else whole_facets(mesh, points)
+    see = visibility(nominal, cells, views, steepest, masks)
+    points, n = cells.points, len(cells.node)
+    there = np.where(cells.part >= SMALLEST, np.diff(points.starts), 0)
+    counts = np.bincount(points.facet[see.used], minlength=len(there))
+    good = (there > 0) & (counts >= FEWEST)
+    kept = np.flatnonzero(good)
     if not len(kept):
         raise MeasurementError(_unseen(views, see.seen))
-    chosen = see.used & (counts >= FEWEST)[facet]
-    node, triangles = np.unique(mesh.triangles[kept], return_inverse=True)
+    chosen = see.used & good[points.facet]
+    node, triangles = np.unique(cells.triangles[kept], return_inverse=True)
     seen = EvaluationPoints(
         points.places[chosen], points.shapes[chosen], np.concatenate([[0], np.cumsum(counts[kept])]), points.chord
     )
-    there = np.bincount(mesh.triangles.ravel(), np.repeat(count**2, 3), minlength=len(mesh))
-    taken = np.bincount(mesh.triangles.ravel(), np.repeat(counts, 3), minlength=len(mesh))
+    around = np.bincount(cells.triangles.ravel(), np.repeat(there, 3), minlength=n)
+    taken = np.bincount(cells.triangles[kept].ravel(), np.repeat(counts[kept], 3), minlength=n)
     return Scene(
-        mesh.nodes[node],
-        mesh.normals[node],
+        mesh.nodes[cells.node[node]],
+        cells.normals[node],
         triangles.reshape(-1, 3),
         seen,
         see.taking[kept],
-        node,
-        kept,
-        (taken / np.maximum(there, 1))[node],
+        cells.node[node],
+        cells.sheet[node],
+        cells.own[node],
+        cells.facet[kept],
+        (taken / np.maximum(around, 1))[node],
     )
 
 

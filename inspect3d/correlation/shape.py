@@ -67,7 +67,8 @@ class Shape:
         Those with at least half their evaluation points in facets on which the pictures agree, off creases, and that
         move across these facets.
         """
-        return self.scene.whole & self.scene.upright & ~self.mesh.crease[self.scene.node]
+        scene = self.scene
+        return scene.own & scene.whole & scene.upright & ~self.mesh.crease[scene.node]
 
     @property
     def observed(self) -> Booleans:
@@ -83,7 +84,7 @@ class Shape:
         weights = self.scene.gathered(np.ones((len(scene.triangles), 3)))
         sums = scene.gathered(np.repeat(self.facets.correlation[:, None], 3, axis=1))
         residual = np.full(len(self.mesh), np.nan)
-        residual[scene.node] = np.sqrt(np.clip(1 - sums / weights, 0, 2) / 2)
+        residual[scene.node[scene.own]] = np.sqrt(np.clip(1 - sums / weights, 0, 2) / 2)[scene.own]
         return residual
 
     @property
