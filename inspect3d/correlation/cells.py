@@ -29,9 +29,9 @@ class Cells:
     Parameters
     ----------
     node : (n,) number in the inspection mesh of each node; those that a mesh node is made of stand side by side
+    sheet : (n,) number of the sheet that it moves with, see `inspect3d.nominal.sheets`
     normals : (n, 3), unit, of that sheet
-    sheet : (n,) number of its sheet, see `inspect3d.nominal.sheets`
-    own : (n,), whether the mesh node lies on this sheet
+    own : (n,), whether the mesh node lies on that sheet
     triangles : (f, 3) nodes of each cell
     facet : (f,) number in the inspection mesh of the facet that it is part of
     part : (f,) share of the facet's points
@@ -70,6 +70,8 @@ def cut_facets(nominal: Nominal, points: EvaluationPoints, feet: Feet) -> Cells:
         return whole_facets(mesh, points)
     of_face = sheets(nominal.exact)
     edges = edges_between(nominal.surface, of_face[nominal.surface_face], PIECES * mesh.edge_length)
+    if not len(edges.ends):
+        return whole_facets(mesh, points)
     count = int(of_face.max()) + 1
     key = points.facet * count + of_face[nominal.surface_face[feet.triangle]]
     order = np.argsort(key, kind="stable")

@@ -26,6 +26,7 @@ from inspect3d.correlation.texture import speckle_size
 from inspect3d.correlation.uncertainty import uncertainty
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
+from inspect3d.register.gauge import FREE
 
 SHAPE = (Level(6, 1000, 8, "shape"), Level(3, 100, 8, "shape"), Level(1.5, 1, 8, "shape"), Level(0, 0, 20, "shape"))
 POSES = (Level(6, 0, 15, "poses"), Level(3, 0, 15, "poses"))
@@ -35,8 +36,9 @@ SPLINES = (SHAPE[0], SHAPE[1], SHAPE[3])
 """Ways from coarse to fine: shape alone, cameras and shape together, the paper's two steps; and splines alone.
 
 Of cameras and shape together only the poses are brought near the nominal shape first: lenses that take its true
-deviations for errors of their own would run far off their priors. Before a shape that is nearly a plane the poses may
-run off as well, along the plane: then they are sought again with such slides held.
+deviations for errors of their own would run far off their priors. Poses that are free run off as well, along the
+surface, by what is wrong with their lenses: such slides are held, where the start has them. Before a known rig the
+nominal shape tells where along itself the part lies; where that runs off, as of nearly a plane, slides are held too.
 """
 
 NOISY = 25.0
@@ -111,7 +113,8 @@ class Correlate:
         levels = self.levels or (JOINT if freedom.unknowns else SHAPE if self.splines is None else SPLINES)
         coarse = levels[:-1] if freedom.unknowns else levels
         calibrating = tuple(takewhile(lambda level: level.moves in ON_NOMINAL, coarse))
-        state = Solver(calibrating, COARSE)(seen, pictures, views, freedom, told=told)
+        slides = SOFT if freedom.poses == "free" else FREE
+        state = Solver(calibrating, COARSE, slides=slides)(seen, pictures, views, freedom, told=told)
         if slid(seen, views, state.views) > FARTHEST:
             state = Solver(calibrating, COARSE, slides=SOFT)(seen, pictures, views, freedom, told=told)
         calibrated = state.views if calibrating else None

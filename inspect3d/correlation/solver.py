@@ -108,7 +108,7 @@ class Solver:
     tolerance : mm; the last level ends when no node moves farther in a step, or by more than half a per cent of the
         uncertainty that unknown cameras give the shape; the others at half a micrometre, times the pixels of the blur.
         Where the nodes do not move by themselves it takes a tenth of a micrometre, and three
-    slides : share of the stiffest motion's stiffness below which a motion of the part before a shape that is held is
+    slides : share of the stiffest motion's stiffness below which a motion of the part, while the poses alone move, is
         taken for a slide of the surface in itself, and held
 
     After four steps of a level, one that turns back is halved, and so are the next until they go on: where the
@@ -267,11 +267,11 @@ def _step(
     ----------
     columns : camera parameters of each view in `found`
     known : of a smooth shift of the pictures, which is found along with the cameras and anew in each step
-    share : below which motions before a shape that is held are slides, see `Solver`
+    share : below which motions are slides while poses move, see `Solver`
     """
     mixing, sigmas = freedom.spread(columns)
     scale = freedom.scale(state.views, scene.sample)
-    slides = slides_of(scene, freedom, state.views, share if level.moves in ON_NOMINAL else FREE)
+    slides = slides_of(scene, freedom, state.views, share if level.moves == "poses" else FREE)
     camera_right = mixing.T @ found.camera_right / noise - freedom.offset(state.views) / sigmas**2
     if level.moves in ON_NOMINAL:
         matrix = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)
@@ -287,7 +287,7 @@ def _step(
     system = system_of(scene, found, factors, noise, freedom, columns, scale, slides, level.stiffness, blocks)
     shape, together = system.solve(_equations(scene, found, noise, state, level)[1], camera_right)
     cameras, shift = np.split(together, [len(sigmas)])
-    if freedom.poses != "known" and level.blur == 0:  # the blurred pictures have shown where the surface lies
+    if freedom.poses == "free" or (freedom.poses == "common" and level.blur == 0):
         shape, cameras = stilled(scene, freedom, state.views, state.deviation, shape, cameras)
     by_cameras = (scene.space.rows(scene) @ system.following @ system.factor_by_cameras)[scene.whole]
     return shape, cameras, shift, float(np.sqrt((by_cameras**2).sum() / max(len(by_cameras), 1)))
