@@ -69,9 +69,9 @@ def cut_facets(nominal: Nominal, points: EvaluationPoints, feet: Feet) -> Cells:
     if not isinstance(nominal.exact, Brep) or nominal.surface_face is None:
         return whole_facets(mesh, points)
     of_face = sheets(nominal.exact)
-    edges = edges_between(nominal.surface, of_face[nominal.surface_face], PIECES * mesh.edge_length)
-    if not len(edges.ends):
+    if np.ptp(of_face[1:]) == 0:
         return whole_facets(mesh, points)
+    edges = edges_between(nominal.surface, of_face[nominal.surface_face], PIECES * mesh.edge_length)
     count = int(of_face.max()) + 1
     key = points.facet * count + of_face[nominal.surface_face[feet.triangle]]
     order = np.argsort(key, kind="stable")
