@@ -72,6 +72,17 @@ def test_two_free_projection_matrices_hide_fifteen_motions_that_priors_name():
     assert told > 7.5  # of eight; the elements say a little about the last
 
 
+def test_what_weak_priors_alone_tell_is_not_held_beside_a_stiff_one(wavy):
+    _, views, seen, stack = wavy
+    found = []
+    for bent in (0.0, 1e-4):
+        lens = Lens(120.0, 15.0, (0.0, bent, 0.0, 0.0, 0.0))
+        system = camera_system(seen, stack, views, Freedom("free", (lens,) * 2, views, seen.centre))
+        assert len(system.unseen) == 0
+        found.append(np.sqrt(np.diag(system.camera_covariance))[[12, 13, 14]])
+    assert found[1] == pytest.approx(found[0], rel=1e-3)
+
+
 def photographed_wave(views):
     """Return the pictures of the sheet without noise."""
     speckle = Speckle.drawn(np.random.default_rng(0), 0.7)
