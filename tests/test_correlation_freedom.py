@@ -125,6 +125,22 @@ def test_a_stilled_step_slides_no_more_than_it_must_and_shows_the_same_dispariti
     assert np.abs(still.mean(axis=(0, 1))).max() < 0.02 * np.abs(plain.mean(axis=(0, 1))).max()
 
 
+def test_to_keep_a_narrow_plane_still_nothing_tilts_it(flat):
+    _, views, seen = flat
+    middles = seen.nodes[seen.triangles].mean(axis=1)
+    strip, _ = seen.restricted(np.abs(middles[:, 1] - seen.centre[1]) < 0.1 * np.ptp(seen.nodes[:, 1]))
+    free = Freedom("free", (Lens(),) * 2, views, strip.centre)
+    _, values, _ = motions_of(strip, free)
+    assert np.count_nonzero(values**2 <= SOFT * values[0] ** 2) == 5  # two shifts, a turn, growth, and a tilt
+    random = np.random.default_rng(0)
+    cameras = 0.1 * free.scale(views, strip.nodes) * random.normal(size=free.unknowns)
+    shape, after = stilled(
+        strip, free, views, random.normal(0, 0.02, len(strip.nodes)), np.zeros(len(strip.nodes)), cameras
+    )
+    assert np.abs(shape).max() < 0.1
+    assert slid(strip, views, free.moved(views, after)) < 1.2 * slid(strip, views, free.moved(views, cameras))
+
+
 def test_a_state_in_the_gauge_has_no_motion_of_the_part_and_shows_the_same_pictures(wavy):
     _, views, seen, _ = wavy
     free = Freedom("free", (Lens(),) * 2, views, seen.centre)

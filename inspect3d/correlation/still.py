@@ -15,6 +15,7 @@ from inspect3d.register.gauge import FREE
 
 SOFT = 0.1  # share of the stiffest motion's stiffness; a motion that moves the surface in itself mostly has less
 FOLLOWED = 0.1  # of the motions in which the surface slides in itself: a space that misses less nearly has them
+SLIDING = 0.1  # of the slide that most slides the surface; a motion of the part that slides it less is none
 SMALL = 1e-3  # mm, or of a motion of the part
 
 
@@ -27,7 +28,8 @@ def stilled(
     pictures show. The gauge of the system takes the motion that leaves the shape none of its own, and so lets what the
     pictures show weakly slide the surface through them by many pixels: over noise that is another every time, and over
     the outline of the part. Here the motions that move the surface in itself mostly are chosen such that its points
-    stay where they are in the mean of the pictures, as far as they can and the scene's space has such motions.
+    stay where they are in the mean of the pictures, as far as they can and the scene's space has such motions. To tilt
+    a narrow plane moves its nodes little, and slides it less: no tilt keeps it still.
 
     A space that has none holds such motions of the part by this, where they started. One that follows them but for a
     few per cent, as splines do on a smooth sheet, would take steps for ever that its gauge takes back: there the step
@@ -62,7 +64,7 @@ def stilled(
         return np.mean(slides, axis=0).ravel()
 
     columns = [slide(SMALL * u, SMALL * p) / SMALL for u, p in zip(fields.T, changes.T, strict=True)]
-    sizes = np.linalg.lstsq(np.stack(columns, axis=1), -slide(shape, cameras), rcond=None)[0]
+    sizes = np.linalg.lstsq(np.stack(columns, axis=1), -slide(shape, cameras), rcond=SLIDING)[0]
     return shape + fields @ sizes, cameras + changes @ sizes
 
 
