@@ -259,10 +259,31 @@ def test_a_factor_of_many_panels_inverts_and_helps_with_a_matrix_like_it():
     assert factor.inverse_diagonal == pytest.approx(np.diag(np.linalg.inv(dense)))
     right = random.normal(size=len(dense))
     assert dense @ factor.solve(right) == pytest.approx(right)
-    found = conjugate(seen.matrix(1.05 * values), right, factor)
+    found = conjugate(seen.matrix(1.05 * values), right, factor.solve, 6)
     assert found == pytest.approx(np.linalg.solve(1.05 * dense, right))
     other = seen.assembled(random.uniform(0, 1, len(blocks))[:, None, None] ** 20 * blocks)
-    assert conjugate(seen.matrix(other + 1e-6 * seen.plate), right, factor) is None
+    assert conjugate(seen.matrix(other + 1e-6 * seen.plate), right, factor.solve, 6) is None
+
+
+def test_a_matrix_without_a_plate_is_solved_with_its_diagonal_in_few_steps():
+    seen, random = scene(sheet(edge=2.0), rig(), 20.0, STEEPEST, [None, None]), np.random.default_rng(0)
+    blocks = random.uniform(0.5, 1, len(seen.triangles))[:, None, None] * (np.ones((3, 3)) + np.eye(3))
+    matrix = seen.matrix(seen.assembled(blocks))
+    wanted = random.normal(size=len(seen.nodes))
+    found = conjugate(matrix, matrix @ wanted, lambda rest: rest / matrix.diagonal(), 12)
+    assert found == pytest.approx(wanted, abs=0.05)
+
+
+def test_a_part_of_a_scene_is_factored_in_the_order_of_the_whole_and_times_a_number():
+    seen, random = scene(sheet(edge=2.0), rig(), 20.0, STEEPEST, [None, None]), np.random.default_rng(0)
+    part, node = seen.restricted(random.uniform(size=len(seen.triangles)) < 0.8)
+    values = part.assembled(np.tile(np.ones((3, 3)) + np.eye(3), (len(part.triangles), 1, 1))) + 0.1 * part.plate
+    factor, inverse = part.ordering.factor(values), np.linalg.inv(part.matrix(values).toarray())
+    assert len(node) < len(seen.nodes)
+    assert len(factor.lower) < len(seen.ordering.shape[1])
+    assert factor.inverse_diagonal == pytest.approx(np.diag(inverse))
+    assert factor.times(4.0).inverse_diagonal == pytest.approx(np.diag(inverse) / 4)
+    assert factor.times(4.0).solve(inverse[0]) == pytest.approx(inverse @ inverse[0] / 4)
 
 
 def test_a_point_sees_a_target_unless_its_ray_meets_the_surface_before(wavy):

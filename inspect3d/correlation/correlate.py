@@ -18,7 +18,7 @@ from inspect3d.correlation.picture import Interpolation, Pictures
 from inspect3d.correlation.scene import Scene, scene
 from inspect3d.correlation.shape import Shape
 from inspect3d.correlation.shift import needed_columns
-from inspect3d.correlation.solver import COARSE, ON_NOMINAL, Level, Solver, State, Step, held
+from inspect3d.correlation.solver import COARSE, FINE, ON_NOMINAL, Level, Solver, State, Step, held
 from inspect3d.correlation.splines import Splines
 from inspect3d.correlation.still import SOFT, in_gauge, slid
 from inspect3d.correlation.systematic import Systematic
@@ -118,21 +118,22 @@ class Correlate:
         if slid(seen, views, state.views) > FARTHEST:
             state = Solver(calibrating, COARSE, slides=SOFT)(seen, pictures, views, freedom, told=told)
         calibrated = state.views if calibrating else None
-        state = Solver(coarse[len(calibrating) :])(seen, pictures, state.views, freedom, told=told)
+        enough = FINE if freedom.unknowns else COARSE  # known cameras: it tells then which facets count
+        state = Solver(coarse[len(calibrating) :], enough)(seen, pictures, state.views, freedom, told=told)
         fine = Solver(levels[-1:], systematic=self.systematic)
         last = freedom if levels[-1].moves == "both" else held(freedom)
         if freedom.unknowns:  # the cameras have moved, and with them the outline of the part in the pictures
             before, seen = seen, self._scene(nominal, state.views, masks)
             state = fine(seen, pictures, state.views, freedom, seen.carried(before, state.deviation), told)
-        found = self._found(seen, pictures, state, last)
+        found, fitted = self._found(seen, pictures, state, last), freedom.unknowns > 0
         for _ in range(ROUNDS):
             good = self._good(seen, found) & (seen.tilt(state.deviation) <= STEEPEST_TILT)
-            if good.all():
+            if good.all() and fitted:
                 break
             _require_some(good, found)
             seen, node = seen.restricted(good)
             state = fine(seen, pictures, state.views, freedom, state.deviation[node], told)
-            found = self._found(seen, pictures, state, last)
+            found, fitted = self._found(seen, pictures, state, last), True
         size, systematic = 0.0, self.systematic
         if systematic is not None:
             systematic = systematic.at_least(disagreement(seen, pictures.sharp, state.views, state.motion), seen)

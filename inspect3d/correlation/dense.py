@@ -33,6 +33,10 @@ class DenseFactor:
         """Return t' A⁻¹ t for each row t."""
         return np.asarray(rows.multiply(rows @ self.inverse).sum(axis=1)).ravel()
 
+    def times(self, number: float) -> DenseFactor:
+        """Return the factor of A times a positive number."""
+        return DenseFactor(np.sqrt(number) * self.lower)
+
 
 def cholesky(matrix: Floats) -> Floats:
     """Return L of a matrix upon a ridge, a tiny share of the median of its diagonal, which holds what nothing tells."""

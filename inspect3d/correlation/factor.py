@@ -18,28 +18,34 @@ class Ordering:
     Parameters
     ----------
     starts, columns : the rows of the symmetric pattern with its diagonal, n unknowns, columns ascending
+    within : a larger pattern that holds this one, and the number (n,) of each unknown there
     """
 
     starts: Integers
     columns: Integers
+    within: tuple[Ordering, Integers] | None = None
 
     @cached_property
     def order(self) -> Integers:
-        """Return the unknowns in the order of elimination (n,): minimum degree, by SuperLU.
+        """Return the unknowns in the order of elimination (n,): by minimum degree, or as in the larger pattern.
 
         Each follows right upon those on whose elimination its own depends.
         """
-        from scipy.sparse.linalg import splu
-
         from inspect3d.correlation.sparse_kernel import children_first, elimination_tree
+
+        order = self._least_degree() if self.within is None else np.argsort(self.within[0].place[self.within[1]])
+        starts, columns, _ = self._in_order(order)
+        return order[children_first(elimination_tree(starts, columns))]
+
+    def _least_degree(self) -> Integers:
+        """Return an order of minimum degree, (n,), by SuperLU, which factors a matrix to tell."""
+        from scipy.sparse.linalg import splu
 
         n = len(self.starts) - 1
         pattern = sparse.csc_matrix((-np.ones(len(self.columns)), self.columns, self.starts), shape=(n, n))
         pattern.setdiag(np.diff(self.starts) + 1.0)
         options = {"SymmetricMode": True}
-        order = np.argsort(splu(pattern, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).perm_c)
-        starts, columns, _ = self._in_order(order)
-        return order[children_first(elimination_tree(starts, columns))]
+        return np.argsort(splu(pattern, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).perm_c)
 
     @cached_property
     def place(self) -> Integers:
@@ -88,11 +94,16 @@ class Ordering:
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """A = L D L', rows and columns in the order of elimination."""
+    """A = L D L', rows and columns in the order of elimination; it may be a number times another, whose L it shares."""
 
     ordering: Ordering
     lower: Floats
     diagonal: Floats
+    _other: Factor | None = None
+
+    def times(self, number: float) -> Factor:
+        """Return the factor of A times a positive number; what this one has worked out serves it too."""
+        return Factor(self.ordering, self.lower, number * self.diagonal, self)
 
     def solve(self, right: Floats) -> Floats:
         """Return A⁻¹ b for right-hand sides (n,) or (n, m)."""
@@ -106,6 +117,10 @@ class Factor:
 
     @cached_property
     def _inverse(self) -> tuple[Floats, Floats]:
+        if self._other is not None:
+            lower, diagonal = self._other._inverse
+            number = self.diagonal[0] / self._other.diagonal[0]
+            return lower / number, diagonal / number
         from inspect3d.correlation.sparse_kernel import inverted
 
         begins, rows, panels = self.ordering.shape

@@ -205,7 +205,8 @@ def lack_of_fit(
     increment, cameras = system.solve(scores, np.zeros(freedom.unknowns))
     left = found.after(increment[scene.triangles], freedom.spread(columns)[0] @ cameras)
     before, noise = noise, noise_of(left, weights, unknowns)
-    system = system_of(free, found, factors, noise, freedom, columns, scale, slides)
+    motion = system.motion.times(before / noise)
+    system = system_of(free, found, factors, noise, freedom, columns, scale, slides, motion=motion)
     blocks = found.node * (factors / noise)[:, None, None]
     whole = found.clean * found.node.sum(axis=(1, 2))
     alone = np.divide(found.right.sum(axis=1), whole, out=np.zeros(len(whole)), where=whole > 0)

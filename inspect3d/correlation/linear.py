@@ -12,6 +12,7 @@ from inspect3d.correlation.freedom import Freedom
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.shift import ShiftBlocks
+from inspect3d.correlation.space import Factored
 from inspect3d.correlation.system import System
 from inspect3d.register.gauge import FREE
 from inspect3d.register.mobility import jacobian, spread
@@ -93,6 +94,7 @@ def system_of(
     slides: Floats,
     stiffness: float = 0.0,
     shift: ShiftBlocks | None = None,
+    motion: Factored | None = None,
 ) -> System:
     """Return the normal equations.
 
@@ -105,9 +107,11 @@ def system_of(
     slides : (m, s), see `slides_of`
     stiffness : see `inspect3d.correlation.space.plates`
     shift : what the pictures show of a smooth shift of them, as unknowns beside the cameras
+    motion : the matrix of the shape factored, where it is known
     """
     space, weights = scene.space, (factors / noise)[:, None, None]
-    motion = space.factored(scene, space.matrix(scene, found.node * weights, stiffness)[0])
+    if motion is None:
+        motion = space.factored(scene, space.matrix(scene, found.node * weights, stiffness)[0])
     gauge = space.rows(scene).T @ gauge_of(scene, freedom)
     mixing, sigmas = freedom.spread(columns)
     cross = space.gathered(scene, found.cross * weights) @ mixing

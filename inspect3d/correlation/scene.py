@@ -41,6 +41,7 @@ class Scene:
     facet : (f,) number of each facet there
     share : (n,) how much of the evaluation points around a node counts
     space : how the nodes may move
+    within : the order of elimination in a larger scene and the number (n,) that each node has there, if any
     """
 
     nodes: Floats
@@ -54,6 +55,7 @@ class Scene:
     facet: Integers
     share: Floats
     space: Space = EVERY_NODE
+    within: tuple[Ordering, Integers] | None = None
 
     @cached_property
     def centre(self) -> Floats:
@@ -86,11 +88,15 @@ class Scene:
         """Return the diagonal of the nodes' bounding box, mm."""
         return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
 
+    @property
+    def _sides(self) -> Integers:
+        """Return the ends of the sides of all facets, (3 f, 2)."""
+        return np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
+
     @cached_property
     def adjacency(self) -> sparse.csr_matrix:
         """Return a one for every pair of neighbours, (n, n)."""
-        ends = np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
-        n = len(self.nodes)
+        n, ends = len(self.nodes), self._sides
         pairs = sparse.coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(n, n)).tocsr()
         pairs = pairs + pairs.T
         pairs.data[:] = 1.0
@@ -99,10 +105,13 @@ class Scene:
     @cached_property
     def rim(self) -> Booleans:
         """Tell which facets touch the edge of what is seen, (f,)."""
-        ends = np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
-        edges, counts = np.unique(np.sort(ends), axis=0, return_counts=True)
-        outer = np.zeros(len(self.nodes), dtype=bool)
-        outer[edges[counts == 1]] = True
+        n = len(self.nodes)
+        sides = np.sort(
+            np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
+        )
+        keys, counts = np.unique(sides @ [n, 1], return_counts=True)
+        outer = np.zeros(n, dtype=bool)
+        outer[np.concatenate(divmod(keys[counts == 1], n))] = True
         return np.asarray(outer[self.triangles].any(axis=1))
 
     @cached_property
@@ -111,7 +120,7 @@ class Scene:
         near = self.adjacency + sparse.identity(len(self.nodes), format="csr")
         pattern = (near @ near).tocsr()
         pattern.sort_indices()
-        return Ordering(pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64))
+        return Ordering(pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64), self.within)
 
     @cached_property
     def positions(self) -> Integers:
@@ -205,6 +214,7 @@ class Scene:
             self.facet[kept],
             (self.share * after / before)[node],
             self.space.restricted(node, kept),
+            (self.ordering, node),
         )
         return rest, node
 

@@ -28,11 +28,12 @@ from inspect3d.register.mobility import spread
 
 SHORTER, LONGER, LEAST, PATIENCE = 0.5, 1.2, 0.02, 4
 WORSE = 1.02  # times the variance of the residuals before it: a step that leads to more went too far
-COARSE = 5e-4  # mm
+FINE, COARSE = 1e-5, 5e-4  # mm
 FINE_FEW, COARSE_FEW = 1e-4, 3e-3  # mm, for unknowns fewer than the nodes, whose steps shrink many times each
 SETTLED = 0.005  # share of what the cameras leave open about the shape: a shorter step changes nothing of note
 RUNAWAY = 0.3  # of the extent of what is seen: a step that large leads nowhere
 FARTHEST = 1.0  # px, or the blur: a step of the cameras before a shape that is held moves the pictures no farther
+MOST, MOST_PLAIN = 6, 30  # steps of conjugate gradients, with the factor of a similar matrix and with the diagonal
 Moves = Literal["poses", "cameras", "shape", "both"]
 ON_NOMINAL = ("poses", "cameras")
 
@@ -118,7 +119,7 @@ class Solver:
     """
 
     levels: tuple[Level, ...]
-    tolerance: float = 1e-5
+    tolerance: float = FINE
     systematic: Systematic | None = None
     slides: float = FREE
 
@@ -295,11 +296,19 @@ def _step(
 
 def _step_of_shape(
     scene: Scene, found: Facets, noise: float, state: State, level: Level, similar: Factored | None
-) -> tuple[Floats, Factored]:
-    """Return the step with the cameras held, and a factor that may serve the next step as one of before may this."""
+) -> tuple[Floats, Factored | None]:
+    """Return the step with the cameras held, and a factor that may serve the next step as one of before may this.
+
+    Without a plate that is stiffer than the pictures the diagonal comes so near to the matrix that it takes none.
+    """
     matrix, right = _equations(scene, found, noise, state, level)
-    shape = None if similar is None else conjugate(matrix, right, similar)
-    if similar is None or shape is None:
+    shape = None
+    if level.stiffness <= 1 and not scene.space.confined:
+        diagonal = matrix.diagonal()
+        shape = conjugate(matrix, right, lambda rest: rest / diagonal, MOST_PLAIN)
+    if shape is None and similar is not None:
+        shape = conjugate(matrix, right, similar.solve, MOST)
+    if shape is None:
         similar = scene.space.factored(scene, matrix)
         shape = similar.solve(right)
     return shape, similar

@@ -30,6 +30,9 @@ class Factored(Protocol):
     def quadratic(self, rows: sparse.csr_matrix) -> Floats:
         """Return t' A⁻¹ t for each row t, which belongs to a node and its neighbours."""
 
+    def times(self, number: float) -> Factored:
+        """Return the factor of A times a positive number."""
+
 
 class Space(Protocol):
     """The motions q (k,) that a scene allows: its n nodes move by B q, its facets by what their corners make of it."""

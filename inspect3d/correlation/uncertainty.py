@@ -150,7 +150,10 @@ def uncertainty(
     blocks = None
     if known is not None and freedom.unknowns:
         blocks = shift_blocks(scene, found, columns, mixing, known, factors / total, weights / total)
-    system = system_of(scene, found, factors, total, freedom, columns, scale, slides, shift=blocks)
+    motion_factor = None if scene.space.confined else first.motion.times(before / total)
+    system = system_of(
+        scene, found, factors, total, freedom, columns, scale, slides, shift=blocks, motion=motion_factor
+    )
     rough, model = np.zeros(len(scene.nodes)), None
     if scene.space.confined:
         model = model_error(scene, found, views, weights, still, columns, lack, summed, total, motion)

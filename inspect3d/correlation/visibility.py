@@ -98,10 +98,11 @@ def _within_outline(mesh: InspectionMesh, view: View) -> Booleans:
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     facing = ((view.centre - corners[:, 0]) * normals).sum(axis=1) > 0
     ahead = (view.depth(mesh.nodes) > 0)[mesh.triangles].all(axis=1)
-    shown = corners[facing & ahead].reshape(-1, 3)
-    pixels = np.clip(view.project(shown), -4 * width, 5 * width).reshape(-1, 3, 2)
+    shown = mesh.triangles[facing & ahead]
+    places, needed = np.zeros((len(mesh.nodes), 2)), np.unique(shown)
+    places[needed] = np.clip(view.project(mesh.nodes[needed]), -4 * width, 5 * width)
     filled = np.zeros((height, width), np.uint8)
-    for triangle in np.rint(pixels * 2**FINE).astype(np.int32):
+    for triangle in np.rint(places * 2**FINE).astype(np.int32)[shown]:
         cv2.fillConvexPoly(filled, triangle, 1, shift=FINE)
     framed = cv2.copyMakeBorder(filled, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
     return np.asarray(cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1] > OUTLINE)
