@@ -25,7 +25,7 @@ from inspect3d.arrays import Floats, Singles
 from inspect3d.camera import Camera, View
 from inspect3d.correlation.correlate import Correlate
 from inspect3d.correlation.shape import Shape
-from inspect3d.correlation.solver import Step
+from inspect3d.correlation.state import Step
 from inspect3d.nominal.nominal import InspectionMesh, Nominal
 from inspect3d.nominal.surface import Surface
 from inspect3d.pose import Pose

@@ -6,7 +6,7 @@ import numpy as np
 
 from inspect3d.correlation.normal import facets
 from inspect3d.correlation.picture import Pictures
-from inspect3d.correlation.scene import scene
+from inspect3d.correlation.seen import scene
 from tests.sheets import plane, plane_normals, sheet
 from tests.speckled import Speckle, picture, rig
 

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from inspect3d.correlation.cells import cut_facets, whole_facets
 from inspect3d.correlation.correlate import Correlate
 from inspect3d.correlation.evaluation import evaluation_points
-from inspect3d.correlation.scene import scene
+from inspect3d.correlation.seen import scene
 from inspect3d.correlation.visibility import EDGE
 from inspect3d.nominal.load import load_nominal
 from inspect3d.nominal.sheets import edges_between, sheets

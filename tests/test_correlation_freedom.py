@@ -13,7 +13,7 @@ from inspect3d.correlation.hidden import hidden_motions
 from inspect3d.correlation.linear import gauge_of, motions_of, moving_cameras, slides_of, system_of
 from inspect3d.correlation.normal import facets
 from inspect3d.correlation.picture import Pictures
-from inspect3d.correlation.scene import scene
+from inspect3d.correlation.seen import scene
 from inspect3d.correlation.still import SOFT, in_gauge, slid, stilled
 from inspect3d.correlation.systematic import Systematic
 from inspect3d.pose import Pose

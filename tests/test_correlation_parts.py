@@ -14,7 +14,7 @@ from inspect3d.correlation.factor import Ordering
 from inspect3d.correlation.freedom import COLUMNS, Freedom, Lens
 from inspect3d.correlation.picture import Pictures, Stack
 from inspect3d.correlation.reading_kernel import lens_slope
-from inspect3d.correlation.scene import scene
+from inspect3d.correlation.seen import scene
 from inspect3d.correlation.visibility import visibility
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.nominal.surface import Surface
@@ -203,7 +203,7 @@ from tests.sheets import sheet
 from tests.speckled import rig
 from inspect3d.correlation.picture import Pictures
 from inspect3d.correlation.reading_kernel import lens_slope
-from inspect3d.correlation.scene import scene
+from inspect3d.correlation.seen import scene
 nominal, views = sheet(edge=30.0, fine=7.5), rig()
 seen = scene(nominal, views, 1e9, STEEPEST, [None, None])
 random = np.random.default_rng(0)

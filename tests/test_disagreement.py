@@ -9,7 +9,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from inspect3d.correlation.disagreement import disagreement
 from inspect3d.correlation.freedom import Freedom, Lens, Stand
 from inspect3d.correlation.picture import Pictures
-from inspect3d.correlation.scene import scene
+from inspect3d.correlation.seen import scene
 from inspect3d.correlation.shift import shift_of, slopes_of
 from inspect3d.correlation.systematic import Systematic
 from inspect3d.correlation.texture import speckle_size

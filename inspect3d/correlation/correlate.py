@@ -11,19 +11,22 @@ import numpy as np
 from inspect3d.arrays import Booleans, Floats
 from inspect3d.camera import View
 from inspect3d.correlation.disagreement import disagreement
+from inspect3d.correlation.finer import quartered
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.hidden import hidden_motions
 from inspect3d.correlation.normal import Facets, facets
 from inspect3d.correlation.picture import Interpolation, Pictures
-from inspect3d.correlation.scene import Scene, scene
+from inspect3d.correlation.scene import Scene
+from inspect3d.correlation.seen import scene
 from inspect3d.correlation.shape import Shape
 from inspect3d.correlation.shift import needed_columns
-from inspect3d.correlation.solver import COARSE, FINE, ON_NOMINAL, Level, Solver, State, Step, held
+from inspect3d.correlation.solver import COARSE, Solver, held
 from inspect3d.correlation.splines import Splines
+from inspect3d.correlation.state import ON_NOMINAL, Level, State, Step
 from inspect3d.correlation.still import SOFT, in_gauge, slid
 from inspect3d.correlation.systematic import Systematic
 from inspect3d.correlation.texture import speckle_size
-from inspect3d.correlation.uncertainty import uncertainty
+from inspect3d.correlation.uncertainty import Uncertainty, uncertainty
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
 from inspect3d.register.gauge import FREE
@@ -44,9 +47,25 @@ nominal shape tells where along itself the part lies; where that runs off, as of
 NOISY = 25.0
 STEEPEST_TILT = 0.2
 ENOUGH = 0.3
+DOTS = 3.0  # of the speckle along an edge
+UNFIT = 0.05  # of the facets
+ALIKE = 1.5  # times what independent residuals add up to
+BETTER = 0.8  # of what was missed before: else a finer mesh is of no use
 FRAYED, CLEAR = 3.0, 0.999
 ROUNDS = 5
 FARTHEST = 12.0  # px, twice the first blur: no start that leads anywhere is off by so much
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """What the pictures show of a scene: shape and cameras, the facets there, what may change, and how sure it is."""
+
+    seen: Scene
+    state: State
+    found: Facets
+    freedom: Freedom
+    sure: Uncertainty
+    systematic: Systematic | None
 
 
 @dataclass(frozen=True)
@@ -66,6 +85,10 @@ class Correlate:
         more than a shift of that size may by chance, by as much as they do
     smoothing : stiffness of a plate that smooths the map when it has been found, in medians of the nodes' own; 0: none
     splines : nodes move as the control points of the CAD's own NURBS faces have it; none: each by itself
+
+    Where the elements do not follow the part they are cut in four for the measurement, again and again while that helps
+    and leaves them three dots of the speckle wide: what they miss would pull at unknown cameras. The map is that of the
+    nodes of the inspection mesh.
     """
 
     levels: tuple[Level, ...] | None = None
@@ -111,29 +134,62 @@ class Correlate:
         known = Freedom("known", tuple(Lens() for _ in views), tuple(views), seen.centre)
         freedom = freedom or known
         levels = self.levels or (JOINT if freedom.unknowns else SHAPE if self.splines is None else SPLINES)
-        coarse = levels[:-1] if freedom.unknowns else levels
+        coarse = levels[:-1]
         calibrating = tuple(takewhile(lambda level: level.moves in ON_NOMINAL, coarse))
         slides = SOFT if freedom.poses == "free" else FREE
         state = Solver(calibrating, COARSE, slides=slides)(seen, pictures, views, freedom, told=told)
         if slid(seen, views, state.views) > FARTHEST:
             state = Solver(calibrating, COARSE, slides=SOFT)(seen, pictures, views, freedom, told=told)
         calibrated = state.views if calibrating else None
-        enough = FINE if freedom.unknowns else COARSE  # known cameras: it tells then which facets count
-        state = Solver(coarse[len(calibrating) :], enough)(seen, pictures, state.views, freedom, told=told)
-        fine = Solver(levels[-1:], systematic=self.systematic)
-        last = freedom if levels[-1].moves == "both" else held(freedom)
+        state = Solver(coarse[len(calibrating) :])(seen, pictures, state.views, freedom, told=told)
+        start = state.deviation
         if freedom.unknowns:  # the cameras have moved, and with them the outline of the part in the pictures
             before, seen = seen, self._scene(nominal, state.views, masks)
-            state = fine(seen, pictures, state.views, freedom, seen.carried(before, state.deviation), told)
-        found, fitted = self._found(seen, pictures, state, last), freedom.unknowns > 0
+            start = seen.carried(before, start, np.repeat(np.arange(len(nominal.mesh)), 2).reshape(-1, 2))
+        fit = self._fitted(seen, pictures, state.views, freedom, start, levels[-1], told)
+        finer, owner, quarterings = nominal, np.arange(len(nominal.mesh)), 0
+        while _missed(fit.sure) > 1 and self._divisible(fit, pictures):
+            finer, ends = quartered(finer)
+            seen = self._scene(finer, fit.state.views, masks)
+            start = seen.carried(fit.seen, fit.state.deviation, ends)
+            other = self._fitted(seen, pictures, fit.state.views, freedom, start, levels[-1], told)
+            if _missed(other.sure) > BETTER * _missed(fit.sure):
+                break
+            fit, owner, quarterings = other, owner[ends[:, 0]], quarterings + 1
+        seen, state, sure, last = fit.seen.of_nodes(owner), fit.state, fit.sure, fit.freedom
+        local = float(np.sqrt(np.median(sure.system.motion.quadratic(seen.space.rows(seen)))))
+        motions = hidden_motions(seen, sure.system, last, local)
+        if last.poses != "known" and not seen.space.confined:
+            found_views, deviation = in_gauge(seen, last, state.views, state.deviation)
+            state = replace(state, views=found_views, motion=deviation, deviation=deviation)
+        if self.smoothing > 0:
+            sure = sure.smoothed(seen, fit.found, state.weights, state.motion, self.smoothing)
+        return Shape(nominal.mesh, seen, state, sure, motions, fit.found, calibrated, fit.systematic, quarterings)
+
+    def _fitted(
+        self,
+        seen: Scene,
+        pictures: Pictures,
+        views: Sequence[View],
+        freedom: Freedom,
+        start: Floats,
+        level: Level,
+        told: Callable[[Step], None],
+    ) -> _Fit:
+        """Return what the pictures show without blur, from cameras and a deviation (n,) that are near it."""
+        fine = Solver((level,), systematic=self.systematic)
+        hasty = fine if freedom.unknowns else replace(fine, tolerance=COARSE)
+        last = freedom if level.moves == "both" else held(freedom)
+        state = hasty(seen, pictures, views, freedom, start, told)
+        found, ended = self._found(seen, pictures, state, last), freedom.unknowns > 0
         for _ in range(ROUNDS):
             good = self._good(seen, found) & (seen.tilt(state.deviation) <= STEEPEST_TILT)
-            if good.all() and fitted:
+            if good.all() and ended:
                 break
             _require_some(good, found)
             seen, node = seen.restricted(good)
             state = fine(seen, pictures, state.views, freedom, state.deviation[node], told)
-            found, fitted = self._found(seen, pictures, state, last), True
+            found, ended = self._found(seen, pictures, state, last), True
         size, systematic = 0.0, self.systematic
         if systematic is not None:
             systematic = systematic.at_least(disagreement(seen, pictures.sharp, state.views, state.motion), seen)
@@ -141,14 +197,12 @@ class Correlate:
         sure = uncertainty(
             seen, found, state.views, state.weights, last, self.systematic, size, state.shift, state.motion
         )
-        local = float(np.sqrt(np.median(sure.system.motion.quadratic(seen.space.rows(seen)))))
-        motions = hidden_motions(seen, sure.system, last, local)
-        if last.poses != "known" and not seen.space.confined:
-            found_views, deviation = in_gauge(seen, last, state.views, state.deviation)
-            state = replace(state, views=found_views, motion=deviation, deviation=deviation)
-        if self.smoothing > 0:
-            sure = sure.smoothed(seen, found, state.weights, state.motion, self.smoothing)
-        return Shape(nominal.mesh, seen, state, sure, motions, found, calibrated, systematic)
+        return _Fit(seen, state, found, last, sure, systematic)
+
+    def _divisible(self, fit: _Fit, pictures: Pictures) -> bool:
+        """Tell whether the facets, cut in four, are still three dots of the speckle wide."""
+        dot, edge = _dot_and_edge(fit.seen, pictures, fit.state.views)
+        return self.splines is None and edge >= 2 * DOTS * dot
 
     def _scene(self, nominal: Nominal, views: Sequence[View], masks: Sequence[Booleans | None] | None) -> Scene:
         masks = masks or [None] * len(views)
@@ -191,20 +245,31 @@ class Correlate:
 
 def _require_coarse(seen: Scene, pictures: Pictures, views: Sequence[View]) -> None:
     """Refuse facets that are smaller than the dots of the speckle: they show nothing to compare."""
+    dot, edge = _dot_and_edge(seen, pictures, views)
+    sides = seen.triangles[:, :2]
+    if edge < dot:
+        size = float(np.median(np.linalg.norm(seen.nodes[sides[:, 1]] - seen.nodes[sides[:, 0]], axis=1)))
+        raise MeasurementError(
+            f"The mesh is too fine for the speckle: its elements are {edge:.1f} px wide in the pictures, and the dots "
+            f"{dot:.1f} px. Choose an element_size of {size * DOTS * dot / edge:.2g} mm or more (it is {size:.2g} mm), "
+            "or paint a finer speckle."
+        )
+
+
+def _missed(sure: Uncertainty) -> float:
+    """Return how much elements miss of a part, over what is little: some facets, or residuals that add up all over."""
+    return max((1 - sure.fitting) / UNFIT, sure.correlated / ALIKE)
+
+
+def _dot_and_edge(seen: Scene, pictures: Pictures, views: Sequence[View]) -> tuple[float, float]:
+    """Return the size of the speckle's dots and the length of the facets' edges, px, where these are nearest."""
     dots, edges = [], []
     sides = seen.triangles[:, :2]
     for grey, view in zip(pictures.grey, views, strict=True):
         places = view.project(seen.nodes)
         dots.append(speckle_size(np.asarray(grey, dtype=np.float64), places))
         edges.append(float(np.median(np.linalg.norm(places[sides[:, 1]] - places[sides[:, 0]], axis=1))))
-    dot, edge = max(dots), min(edges)
-    if edge < dot:
-        size = float(np.median(np.linalg.norm(seen.nodes[sides[:, 1]] - seen.nodes[sides[:, 0]], axis=1)))
-        raise MeasurementError(
-            f"The mesh is too fine for the speckle: its elements are {edge:.1f} px wide in the pictures, and the dots "
-            f"{dot:.1f} px. Choose an element_size of {size * 3 * dot / edge:.2g} mm or more (it is {size:.2g} mm), or "
-            "paint a finer speckle."
-        )
+    return max(dots), min(edges)
 
 
 def _require_sizes(pictures: Pictures, views: Sequence[View]) -> None:

@@ -14,7 +14,7 @@ from inspect3d.correlation.picks import Picks
 from inspect3d.correlation.picture import Pictures, Stack
 from inspect3d.correlation.residual import residuals
 from inspect3d.correlation.shape import Shape
-from inspect3d.correlation.solver import Step
+from inspect3d.correlation.state import Step
 from inspect3d.figure import Descent, Figure, PixelMap
 from inspect3d.nominal.nominal import Nominal
 

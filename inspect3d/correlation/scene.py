@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 
 from inspect3d.arrays import Booleans, Floats, Integers, unit
-from inspect3d.camera import View
-from inspect3d.correlation.cells import SMALLEST, cut_facets, whole_facets
-from inspect3d.correlation.evaluation import EvaluationPoints, evaluation_points, points_per_edge
+from inspect3d.correlation.evaluation import EvaluationPoints
 from inspect3d.correlation.factor import Ordering
 from inspect3d.correlation.space import EVERY_NODE, Space
-from inspect3d.correlation.visibility import visibility
-from inspect3d.nominal.nominal import Nominal
 from inspect3d.nominal.remeshing import FEATURE_ANGLE
-from inspect3d.outcome import MeasurementError
 
-FEWEST = 6
 WHOLE = 0.5
 SAMPLE = 200
 
@@ -218,13 +211,30 @@ class Scene:
         )
         return rest, node
 
-    def carried(self, other: Scene, deviation: Floats) -> Floats:
-        """Return the deviation (n,) that nodes of another scene of the same mesh have, (m,); zero where it has none."""
+    def of_nodes(self, owner: Integers) -> Scene:
+        """Return the scene with nodes numbered as in a coarser mesh.
+
+        Parameters
+        ----------
+        owner : (k,) number there of each node of this inspection mesh; for those that the coarser one has not, of
+            another, which they are not
+        """
+        return replace(self, node=owner[self.node], own=self.own & (owner[self.node] == self.node))
+
+    def carried(self, other: Scene, deviation: Floats, ends: Integers) -> Floats:
+        """Return the deviation (n,) that nodes have in another scene (m,): the mean of their ends, or 0 without any.
+
+        Parameters
+        ----------
+        ends : (k, 2) numbers in the other's inspection mesh of the ends of each node of this one's
+        """
         count = 1 + max(self.sheet.max(), other.sheet.max())
-        here, there = (scene.node * count + scene.sheet for scene in (self, other))
+        there = other.node * count + other.sheet
+        here = ends[self.node] * count + self.sheet[:, None]
         at = np.searchsorted(there, here)
         at[at == len(there)] = 0
-        return np.where(there[at] == here, deviation[at], 0.0)
+        found = there[at] == here
+        return (deviation[at] * found).sum(axis=1) / np.maximum(found.sum(axis=1), 1)
 
     def smoother(self, weights: Floats) -> sparse.csr_matrix:
         """Return T = (I + M_lumped⁻¹ M) / 2 with the mass matrices of the facets weighted by `weights` (f,).
@@ -243,70 +253,3 @@ class Scene:
         smoother = smoother.tocsr()
         smoother.eliminate_zeros()
         return smoother
-
-
-def scene(
-    nominal: Nominal,
-    views: Sequence[View],
-    pixels: float,
-    steepest: float,
-    masks: Sequence[Booleans | None],
-    per_edge: int | None = None,
-    lifted: bool = True,
-    cut: bool = True,
-) -> Scene:
-    """Return what the views see of a part.
-
-    Parameters
-    ----------
-    pixels : px of the largest picture that one evaluation point stands for
-    steepest : rad, largest angle between normal and line of sight
-    masks : of each view, True where its picture may be used, or None
-    per_edge : evaluation points along the edge of every facet, in place of `pixels`
-    lifted : points on the nominal surface; else on the flat facets
-    cut : facets cut where sheets of the CAD end
-
-    Raises
-    ------
-    MeasurementError
-        No facet is seen by two cameras.
-    """
-    mesh = nominal.mesh
-    count = points_per_edge(mesh, views, pixels) if per_edge is None else np.full(len(mesh.triangles), per_edge)
-    points, feet = evaluation_points(nominal, count, lifted)
-    cells = cut_facets(nominal, points, feet) if cut else whole_facets(mesh, points)
-    see = visibility(nominal, cells, views, steepest, masks)
-    points, n = cells.points, len(cells.node)
-    there = np.where(cells.part >= SMALLEST, np.diff(points.starts), 0)
-    counts = np.bincount(points.facet[see.used], minlength=len(there))
-    good = (there > 0) & (counts >= FEWEST)
-    kept = np.flatnonzero(good)
-    if not len(kept):
-        raise MeasurementError(_unseen(views, see.seen))
-    chosen = see.used & good[points.facet]
-    node, triangles = np.unique(cells.triangles[kept], return_inverse=True)
-    seen = EvaluationPoints(
-        points.places[chosen], points.shapes[chosen], np.concatenate([[0], np.cumsum(counts[kept])]), points.chord
-    )
-    around = np.bincount(cells.triangles.ravel(), np.repeat(there, 3), minlength=n)
-    taken = np.bincount(cells.triangles[kept].ravel(), np.repeat(counts[kept], 3), minlength=n)
-    return Scene(
-        mesh.nodes[cells.node[node]],
-        cells.normals[node],
-        triangles.reshape(-1, 3),
-        seen,
-        see.taking[kept],
-        cells.node[node],
-        cells.sheet[node],
-        cells.own[node],
-        cells.facet[kept],
-        (taken / np.maximum(around, 1))[node],
-    )
-
-
-def _unseen(views: Sequence[View], seen: Booleans) -> str:
-    shares = ", ".join(f"{100 * row.mean():.0f} %" for row in seen)
-    return (
-        f"No part of the surface is seen by two of the {len(views)} cameras (they see {shares} of it): check the "
-        "poses, and that the normals of the part point out of the material."
-    )

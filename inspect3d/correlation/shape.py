@@ -12,7 +12,7 @@ from inspect3d.camera import View
 from inspect3d.correlation.hidden import HiddenMotion
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.scene import Scene
-from inspect3d.correlation.solver import State
+from inspect3d.correlation.state import State
 from inspect3d.correlation.systematic import Systematic
 from inspect3d.correlation.uncertainty import Uncertainty
 from inspect3d.deviate.deviation import Deviation
@@ -34,6 +34,7 @@ class Shape:
     facets : residuals and correlation of the scene's facets
     calibrated : the cameras as they were found on the nominal shape, before it moved; None where they were known
     systematic : the shift of the pictures that is in the uncertainty
+    quarterings : how many times the facets of the mesh were cut in four, since they did not follow the part
     """
 
     mesh: InspectionMesh
@@ -44,6 +45,7 @@ class Shape:
     facets: Facets
     calibrated: tuple[View, ...] | None = None
     systematic: Systematic | None = None
+    quarterings: int = 0
 
     @property
     def views(self) -> tuple[View, ...]:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
@@ -20,6 +19,7 @@ from inspect3d.correlation.picture import Pictures, Stack
 from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.shift import Shift, needed_columns, shift_blocks, shift_of
 from inspect3d.correlation.space import Factored, Matrix
+from inspect3d.correlation.state import ON_NOMINAL, Level, State, Step
 from inspect3d.correlation.still import stilled
 from inspect3d.correlation.systematic import Systematic
 from inspect3d.outcome import MeasurementError
@@ -34,67 +34,6 @@ SETTLED = 0.005  # share of what the cameras leave open about the shape: a short
 RUNAWAY = 0.3  # of the extent of what is seen: a step that large leads nowhere
 FARTHEST = 1.0  # px, or the blur: a step of the cameras before a shape that is held moves the pictures no farther
 MOST, MOST_PLAIN = 6, 30  # steps of conjugate gradients, with the factor of a similar matrix and with the diagonal
-Moves = Literal["poses", "cameras", "shape", "both"]
-ON_NOMINAL = ("poses", "cameras")
-
-
-@dataclass(frozen=True)
-class Level:
-    """One stage of the way from coarse to fine.
-
-    Parameters
-    ----------
-    blur : px, standard deviation of the Gaussian over the pictures
-    stiffness : of the plate that smooths the shape, in median stiffnesses of a node; 0: none
-    steps : at most
-    moves : the cameras with the shape held (paper, eq. 4), or only their poses; the shape with the cameras held
-        (eq. 8); or both at once
-    """
-
-    blur: float
-    stiffness: float
-    steps: int
-    moves: Moves = "both"
-
-
-@dataclass(frozen=True)
-class Step:
-    """How far a step went.
-
-    Parameters
-    ----------
-    level : that it belongs to
-    change : largest motion of a node, or of the part before a camera, mm
-    noise : root mean squared residual before it, grey levels
-    """
-
-    level: Level
-    change: float
-    noise: float
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """Where the solver stands.
-
-    Parameters
-    ----------
-    motion : (k,) unknowns of the scene's space
-    deviation : (n,) mm, by which they move the nodes of the scene
-    views : the cameras
-    weights : (f,) of the facets
-    steps : how it came there
-    settled : the last step was shorter than the tolerance
-    shift : (q,) of a smooth shift of the pictures found beside the cameras, see `ShiftBlocks`; else none
-    """
-
-    motion: Floats
-    deviation: Floats
-    views: tuple[View, ...]
-    weights: Floats
-    steps: tuple[Step, ...] = ()
-    settled: bool = False
-    shift: Floats = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,7 @@ class Uncertainty:
     smoother : T (n, k), from the motions of the scene's space to the deviation of its nodes
     rough : m (n,) mm, of nodes where the elements do not fit, as at a step; 0 elsewhere. Of a smoothed map the bias too
     noise : variance of the residuals where they fit, grey levels²
+    fitting : share of the facets that follow the part, as far as noise lets them tell
     correlated : κ >= 1, by which the residuals of neighbouring points add up to more than if they were independent
     smoothing : S, of a map that is smoothed
     model : what splines miss of the part, added to the covariance; None: nodes move by themselves
@@ -48,6 +49,7 @@ class Uncertainty:
     smoother: sparse.csr_matrix
     rough: Floats
     noise: float
+    fitting: float
     correlated: float
     smoothing: Smoothing | None = None
     model: ModelError | None = None
@@ -167,4 +169,5 @@ def uncertainty(
             response = system.solve(blocks.shape, np.vstack([blocks.cameras, blocks.own]))[0]
             shifts = np.hstack([shifts, np.sqrt((size / systematic.size) ** 2 - 1) * response])
     smoother = scene.space.smoother(scene, weights)
-    return Uncertainty(system, shifts, smoother, rough, noise, summed.correlated, model=model)
+    fitting = float(summed.fitted.mean())
+    return Uncertainty(system, shifts, smoother, rough, noise, fitting, summed.correlated, model=model)

@@ -109,10 +109,17 @@ def remarks(shape: Shape, freedom: Freedom) -> tuple[str, ...]:
             f"The solver stopped after {len(shape.state.steps)} steps of its last stage, before the shape had settled: "
             f"the last step moved it by up to {1000 * shape.state.steps[-1].change:.2g} µm."
         )
-    left_out = np.count_nonzero(~shape.sound)
+    if shape.quarterings:
+        remarks.append(
+            f"Elements of {shape.mesh.edge_length:.2g} mm do not follow the part: its shape was found with elements "
+            f"{2**shape.quarterings} times as fine, and is reported at the nodes of the mesh. A finer element_size shows "
+            "what lies between them."
+        )
+    own = shape.scene.own
+    left_out = np.count_nonzero(own & ~shape.sound)
     if left_out:
         remarks.append(
-            f"{left_out} of the {len(shape.sound)} nodes that two cameras see are not observed: the pictures agree on "
-            "too few of the points around them, or they lie on an edge."
+            f"{left_out} of the {np.count_nonzero(own)} nodes that two cameras see are not observed: the pictures "
+            "agree on too few of the points around them, or they lie on an edge."
         )
     return (*remarks, *_pulled(shape, freedom))
