@@ -112,8 +112,8 @@ def remarks(shape: Shape, freedom: Freedom) -> tuple[str, ...]:
     if shape.quarterings:
         remarks.append(
             f"Elements of {shape.mesh.edge_length:.2g} mm do not follow the part: its shape was found with elements "
-            f"{2**shape.quarterings} times as fine, and is reported at the nodes of the mesh. A finer element_size shows "
-            "what lies between them."
+            f"{2**shape.quarterings} times as fine, and is reported at the nodes of the mesh. A finer "
+            "element_size shows what lies between them."
         )
     own = shape.scene.own
     left_out = np.count_nonzero(own & ~shape.sound)
