@@ -138,7 +138,7 @@ class Correlate:
         calibrating = tuple(takewhile(lambda level: level.moves in ON_NOMINAL, coarse))
         slides = SOFT if freedom.poses == "free" else FREE
         state = Solver(calibrating, COARSE, slides=slides)(seen, pictures, views, freedom, told=told)
-        if slid(seen, views, state.views) > FARTHEST:
+        if slides < SOFT and slid(seen, views, state.views) > FARTHEST:
             state = Solver(calibrating, COARSE, slides=SOFT)(seen, pictures, views, freedom, told=told)
         calibrated = state.views if calibrating else None
         state = Solver(coarse[len(calibrating) :])(seen, pictures, state.views, freedom, told=told)

@@ -15,6 +15,7 @@ from inspect3d.correlation.space import EVERY_NODE, Space
 from inspect3d.nominal.remeshing import FEATURE_ANGLE
 
 WHOLE = 0.5
+SLIVER, FIRMER = 0.25, 1e4
 SAMPLE = 200
 
 
@@ -64,6 +65,14 @@ class Scene:
     def whole(self) -> Booleans:
         """Tell around which nodes at least half of the evaluation points count, (n,)."""
         return self.share >= WHOLE
+
+    @property
+    def slivers(self) -> Booleans:
+        """Tell around which nodes hardly a point counts, (n,).
+
+        Of their facets slivers are seen, far off the node: what these show does not tell where it is.
+        """
+        return self.share < SLIVER
 
     @cached_property
     def upright(self) -> Booleans:
@@ -139,9 +148,18 @@ class Scene:
     @cached_property
     def plate(self) -> Floats:
         """Return R = L'L in the pattern, with L u = mean of the neighbours' u less the node's own: a bending plate."""
+        return self._bending(np.ones(len(self.nodes)))
+
+    @cached_property
+    def support(self) -> Floats:
+        """Return such a plate that is ten thousand times as stiff at nodes of slivers."""
+        return self._bending(np.where(self.slivers, FIRMER, 1.0))
+
+    def _bending(self, weights: Floats) -> Floats:
+        """Return L'WL in the pattern, W of weights (n,)."""
         near = self.adjacency
         laplacian = sparse.diags(1 / np.asarray(near.sum(axis=1)).ravel()) @ near - sparse.identity(len(self.nodes))
-        bending = (laplacian.T @ laplacian).tocoo()
+        bending = (laplacian.T @ sparse.diags(weights) @ laplacian).tocoo()
         values = np.zeros(len(self.ordering.columns))
         values[self.position(bending.row.astype(np.int64), bending.col.astype(np.int64))] = bending.data
         return values

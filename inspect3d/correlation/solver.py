@@ -143,7 +143,8 @@ class Solver:
                 cameras, shift = np.zeros((2, 0))
                 shape, similar = _step_of_shape(scene, found, noise, state, level, similar)
             change = max(
-                float(np.abs(rows @ shape).max()), _reach(scene, cameras, freedom) if level.moves in ON_NOMINAL else 0
+                float(np.abs(rows @ shape)[~scene.slivers].max(initial=0.0)),
+                _reach(scene, cameras, freedom) if level.moves in ON_NOMINAL else 0,
             )
             if count >= PATIENCE:
                 factor = max(factor * SHORTER, LEAST) if shape @ last < 0 else min(factor * LONGER, 1.0)

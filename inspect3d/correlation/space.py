@@ -153,10 +153,10 @@ def plates(scene: Scene, values: Floats, stiffness: float) -> tuple[Floats, Floa
     ----------
     values : of the nodal matrix
     stiffness : of the plate, in medians of the diagonal. A millionth of that stays always, to carry nodes that show no
-        texture, and a billionth of a ridge
+        texture, a hundredth for those of which slivers are seen only, and a billionth of a ridge
     """
     median = typical(values[scene.diagonal])
-    support = SUPPORT * median * scene.plate
+    support = SUPPORT * median * scene.support
     support[scene.diagonal] += RIDGE * median
     return stiffness * median * scene.plate, support
 

@@ -40,7 +40,7 @@ class Step:
     Parameters
     ----------
     level : that it belongs to
-    change : largest motion of a node, or of the part before a camera, mm
+    change : largest motion of a node that is not one of slivers, or of the part before a camera, mm
     noise : root mean squared residual before it, grey levels
     """
 
