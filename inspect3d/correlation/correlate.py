@@ -129,7 +129,8 @@ class Correlate:
         pictures = Pictures(grey, self.interpolation)
         _require_sizes(pictures, views)
         _require_different(pictures)
-        seen = self._scene(nominal, views, masks)
+        loose = freedom is not None and freedom.unknowns > 0
+        seen = self._scene(nominal, views, masks, loose)
         _require_coarse(seen, pictures, views)
         known = Freedom("known", tuple(Lens() for _ in views), tuple(views), seen.centre)
         freedom = freedom or known
@@ -144,13 +145,13 @@ class Correlate:
         state = Solver(coarse[len(calibrating) :])(seen, pictures, state.views, freedom, told=told)
         start = state.deviation
         if freedom.unknowns:  # the cameras have moved, and with them the outline of the part in the pictures
-            before, seen = seen, self._scene(nominal, state.views, masks)
+            before, seen = seen, self._scene(nominal, state.views, masks, loose)
             start = seen.carried(before, start, np.repeat(np.arange(len(nominal.mesh)), 2).reshape(-1, 2))
         fit = self._fitted(seen, pictures, state.views, freedom, start, levels[-1], told)
         finer, owner, quarterings = nominal, np.arange(len(nominal.mesh)), 0
         while _missed(fit.sure) > 1 and self._divisible(fit, pictures):
             finer, ends = quartered(finer)
-            seen = self._scene(finer, fit.state.views, masks)
+            seen = self._scene(finer, fit.state.views, masks, loose)
             start = seen.carried(fit.seen, fit.state.deviation, ends)
             other = self._fitted(seen, pictures, fit.state.views, freedom, start, levels[-1], told)
             if _missed(other.sure) > BETTER * _missed(fit.sure):
@@ -204,7 +205,9 @@ class Correlate:
         dot, edge = _dot_and_edge(fit.seen, pictures, fit.state.views)
         return self.splines is None and edge >= 2 * DOTS * dot
 
-    def _scene(self, nominal: Nominal, views: Sequence[View], masks: Sequence[Booleans | None] | None) -> Scene:
+    def _scene(
+        self, nominal: Nominal, views: Sequence[View], masks: Sequence[Booleans | None] | None, loose: bool
+    ) -> Scene:
         masks = masks or [None] * len(views)
         seen = scene(
             nominal,
@@ -216,6 +219,7 @@ class Correlate:
             self.lifted,
             self.splines is None,
         )
+        seen = replace(seen, loose=loose)
         return seen if self.splines is None else self.splines(nominal, seen)
 
     def _found(self, seen: Scene, pictures: Pictures, state: State, freedom: Freedom) -> Facets:

@@ -36,6 +36,7 @@ class Scene:
     share : (n,) how much of the evaluation points around a node counts
     space : how the nodes may move
     within : the order of elimination in a larger scene and the number (n,) that each node has there, if any
+    loose : nodes of slivers are not held: what holds them would pull at unknown cameras
     """
 
     nodes: Floats
@@ -50,6 +51,7 @@ class Scene:
     share: Floats
     space: Space = EVERY_NODE
     within: tuple[Ordering, Integers] | None = None
+    loose: bool = False
 
     @cached_property
     def centre(self) -> Floats:
@@ -68,11 +70,11 @@ class Scene:
 
     @property
     def slivers(self) -> Booleans:
-        """Tell around which nodes hardly a point counts, (n,).
+        """Tell around which nodes hardly a point counts, (n,), where these are held.
 
         Of their facets slivers are seen, far off the node: what these show does not tell where it is.
         """
-        return self.share < SLIVER
+        return self.share < (0.0 if self.loose else SLIVER)
 
     @cached_property
     def upright(self) -> Booleans:
@@ -226,6 +228,7 @@ class Scene:
             (self.share * after / before)[node],
             self.space.restricted(node, kept),
             (self.ordering, node),
+            self.loose,
         )
         return rest, node
 
