@@ -153,7 +153,10 @@ class Correlate:
             finer, ends = quartered(finer)
             seen = self._scene(finer, fit.state.views, masks, loose)
             start = seen.carried(fit.seen, fit.state.deviation, ends)
-            other = self._fitted(seen, pictures, fit.state.views, freedom, start, levels[-1], told)
+            try:
+                other = self._fitted(seen, pictures, fit.state.views, freedom, start, levels[-1], told)
+            except MeasurementError:  # the pictures do not bear a finer mesh; the map of this one stands
+                break
             if _missed(other.sure) > BETTER * _missed(fit.sure):
                 break
             fit, owner, quarterings = other, owner[ends[:, 0]], quarterings + 1
