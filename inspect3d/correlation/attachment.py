@@ -53,10 +53,11 @@ class Attachment:
             corners = uv[np.searchsorted(nodes, scene.triangles[facets])]
             guess = (shapes[there, :, None] * corners).sum(axis=1)
             near = _near(patch, self._samples[facets, there], guess)
-            of_samples.append(_rows(patch, near, normals[facets, there], first, total, self.ways))
+            of_samples.append(_rows(patch, *near, normals[facets, there], first, total, self.ways))
             sample_order.append(facets * len(shapes) + there)
             own = self._node_face[nodes] == number
-            of_nodes.append(_rows(patch, uv[own], scene.normals[nodes[own]], first, total, self.ways))
+            places = uv[own], patch.normals(uv[own])
+            of_nodes.append(_rows(patch, *places, scene.normals[nodes[own]], first, total, self.ways))
             node_order.append(nodes[own])
             first += self.ways * patch.size
         return SplineSpace(
@@ -104,17 +105,27 @@ def _sorted(blocks: list[sparse.csr_matrix], orders: list[Integers]) -> sparse.c
     return sparse.vstack(blocks, format="csr")[np.argsort(np.concatenate(orders))]
 
 
-def _near(patch: Nurbs, points: Floats, guess: Floats) -> Floats:
-    """Return the parameters (p, 2) of points (p, 3) mm near the surface, from a guess that seams may have spoilt."""
+def _near(patch: Nurbs, points: Floats, guess: Floats) -> tuple[Floats, Floats]:
+    """Return the parameters (p, 2) of points (p, 3) mm near the surface, and the normals of the surface there, (p, 3).
+
+    Parameters
+    ----------
+    guess : (p, 2), which seams may have spoilt
+    """
     uv = patch.descended(points, guess, NEAR)
     low, high = patch.bounds
-    away = np.linalg.norm(patch.points(uv) - points, axis=1)
+    places, *tangents = patch.tangents(uv)
+    normals = patch.normals(uv, (tangents[0], tangents[1]))
+    away = np.linalg.norm(places - points, axis=1)
     doubted = ((uv <= low) | (uv >= high)).any(axis=1) | (away > FAR * np.median(away))
     uv[doubted] = patch.parameters(points[doubted])
-    return uv
+    normals[doubted] = patch.normals(uv[doubted])
+    return uv, normals
 
 
-def _rows(patch: Nurbs, uv: Floats, towards: Floats, first: int, total: int, ways: int) -> sparse.csr_matrix:
+def _rows(
+    patch: Nurbs, uv: Floats, normals: Floats, towards: Floats, first: int, total: int, ways: int
+) -> sparse.csr_matrix:
     """Return how far places (p,) move along directions to follow each control point's motion, (p, total).
 
     The surface moves by v . n along its normal n where the control points move it by v; along a direction m that leans,
@@ -122,11 +133,12 @@ def _rows(patch: Nurbs, uv: Floats, towards: Floats, first: int, total: int, way
 
     Parameters
     ----------
-    towards : m (p, 3), unit
+    normals, towards : n and m, (p, 3), unit
     first : column of the patch's first control point
     """
-    normals = patch.normals(uv)
     upright = (normals * towards).sum(axis=1)
     shares = np.divide(1.0, upright, out=np.zeros(len(uv)), where=upright > UPRIGHT)
     rows = patch.along(uv, normals * shares[:, None], ways)
+    if rows.shape[1] == total:
+        return rows
     return sparse.csr_matrix((rows.data, rows.indices + first, rows.indptr), shape=(len(uv), total))

@@ -142,7 +142,8 @@ class Correlate:
         if slides < SOFT and slid(seen, views, state.views) > FARTHEST:
             state = Solver(calibrating, COARSE, slides=SOFT)(seen, pictures, views, freedom, told=told)
         calibrated = state.views if calibrating else None
-        state = Solver(coarse[len(calibrating) :])(seen, pictures, state.views, freedom, told=told)
+        to_end = self.splines is None or freedom.unknowns > 0
+        state = Solver(coarse[len(calibrating) :], ends=to_end)(seen, pictures, state.views, freedom, told=told)
         start = state.deviation
         if freedom.unknowns:  # the cameras have moved, and with them the outline of the part in the pictures
             before, seen = seen, self._scene(nominal, state.views, masks, loose)
@@ -182,16 +183,19 @@ class Correlate:
     ) -> _Fit:
         """Return what the pictures show without blur, from cameras and a deviation (n,) that are near it."""
         fine = Solver((level,), systematic=self.systematic)
-        hasty = fine if freedom.unknowns else replace(fine, tolerance=COARSE)
+        ended = freedom.unknowns > 0 or self.splines is not None
+        hasty = fine if ended else replace(fine, tolerance=COARSE)
         last = freedom if level.moves == "both" else held(freedom)
         state = hasty(seen, pictures, views, freedom, start, told)
-        found, ended = self._found(seen, pictures, state, last), freedom.unknowns > 0
+        found = self._found(seen, pictures, state, last)
         for _ in range(ROUNDS):
             good = self._good(seen, found) & (seen.tilt(state.deviation) <= STEEPEST_TILT)
             if good.all() and ended:
                 break
             _require_some(good, found)
-            seen, node = seen.restricted(good)
+            node = np.arange(len(seen.nodes))
+            if not good.all():
+                seen, node = seen.restricted(good)
             state = fine(seen, pictures, state.views, freedom, state.deviation[node], told)
             found, ended = self._found(seen, pictures, state, last), True
         size, systematic = 0.0, self.systematic

@@ -116,7 +116,7 @@ class LackOfFit:
 
         What splines cannot follow reaches over a span between knots: its errors do not average out over a few nodes.
         """
-        wide = self._around ** WIDTHS[-1]
+        wide = self._averages[WIDTHS[-1]]
         return (sparse.diags(1 / np.sqrt(np.asarray(wide.power(2).sum(axis=1)).ravel())) @ wide).tocsr()
 
     @cached_property
@@ -133,6 +133,13 @@ class LackOfFit:
         """Return averages over each node and its neighbours, (n, n)."""
         return sparse.diags(1 / np.asarray(self.near.sum(axis=1)).ravel()) @ self.near
 
+    @cached_property
+    def _averages(self) -> dict[int, sparse.csr_matrix]:
+        """Return the averages after one, two and four steps of averaging."""
+        once = self._around
+        twice = once @ once
+        return {1: once, 2: twice, 4: twice @ twice}
+
     def _tests(self, within: System, pushes: Floats, times: float) -> Iterator[Test]:
         """Yield tests of the nodes by themselves, of means over neighbours, of bumps and of facets."""
         around, followed = self._around, self.system.motion.solve(pushes)
@@ -140,9 +147,9 @@ class LackOfFit:
         yield self._moved(sparse.identity(len(self.increment), format="csr"), within, followed, times, ALONE)
         yield self._moved(around, within, followed, times, means)
         for width in WIDTHS:
-            yield self._missed(around**width, within, pushes, times, bumps)
+            yield self._missed(self._averages[width], within, pushes, times, bumps)
         for width in AROUND:
-            yield self._restless(around**width, times, facets)
+            yield self._restless(self._averages[width], times, facets)
 
     def _moved(self, mean: sparse.csr_matrix, within: System, followed: Floats, times: float, beside: float) -> Test:
         """Return the test of means of the increment, (n, n), a row each."""

@@ -18,6 +18,7 @@ from inspect3d.correlation.misfit import Misfit, unresolved
 from inspect3d.correlation.normal import Facets
 from inspect3d.correlation.parting import parting
 from inspect3d.correlation.scene import Scene
+from inspect3d.correlation.space import Factored
 from inspect3d.correlation.spline_space import SplineSpace
 
 MOST = 0.5  # share of the nodes of a face that are missed, from which on all of them are
@@ -68,6 +69,7 @@ def model_error(
     summed: Misfit,
     noise: float,
     motion: Floats,
+    factored: Factored,
 ) -> ModelError:
     """Return what splines miss of a part.
 
@@ -84,11 +86,13 @@ def model_error(
     lack, summed : of the nodes by themselves
     noise : variance of the residuals, correlated as they are, grey levels²
     motion : (k,) mm, the solution
+    factored : the matrix of its motions
     """
     space = scene.space
     assert isinstance(space, SplineSpace)
     scale, slides = freedom.scale(views, scene.sample), slides_of(scene, freedom, views)
-    within = system_of(scene, found, weights * found.clean**2, noise, freedom, columns, scale, slides)
+    factors = weights * found.clean**2
+    within = system_of(scene, found, factors, noise, freedom, columns, scale, slides, motion=factored)
     times, gaps = noise / lack.noise, np.zeros(len(scene.nodes))
     plain, sign = within.variances(space.rows(scene)), np.ones(len(scene.nodes))
     parted = parting(scene, found, views, weights, freedom, columns, noise)

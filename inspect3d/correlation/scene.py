@@ -155,7 +155,7 @@ class Scene:
     @cached_property
     def support(self) -> Floats:
         """Return such a plate that is ten thousand times as stiff at nodes of slivers."""
-        return self._bending(np.where(self.slivers, FIRMER, 1.0))
+        return self._bending(np.where(self.slivers, FIRMER, 1.0)) if self.slivers.any() else self.plate
 
     def _bending(self, weights: Floats) -> Floats:
         """Return L'WL in the pattern, W of weights (n,)."""

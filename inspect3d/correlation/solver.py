@@ -50,6 +50,7 @@ class Solver:
         Where the nodes do not move by themselves it takes a tenth of a micrometre, and three
     slides : share of the stiffest motion's stiffness below which a motion of the part, while the poses alone move, is
         taken for a slide of the surface in itself, and held
+    ends : the last level is the end of the way; else it stops where the others do
 
     After four steps of a level, one that turns back is halved, and so are the next until they go on: where the
     pictures show a motion weakly, a full step goes too far and the next comes back. The robust weights of the facets
@@ -61,6 +62,7 @@ class Solver:
     tolerance: float = FINE
     systematic: Systematic | None = None
     slides: float = FREE
+    ends: bool = True
 
     def __call__(
         self,
@@ -102,7 +104,7 @@ class Solver:
         if level.moves in ("shape", "poses"):
             freedom = held(freedom, poses=level.moves == "shape")
         points = scene.points.thinned(1 + int(1.5 * level.blur**2)) if level.blur >= 1 else scene.points
-        final = number == len(self.levels) - 1
+        final = self.ends and number == len(self.levels) - 1
         fine, coarse = (FINE_FEW, COARSE_FEW) if scene.space.confined else (0.0, COARSE)
         tolerance = max(self.tolerance, fine if final else coarse * max(1.0, level.blur))
         last, factor = np.zeros(len(state.motion)), 1.0

@@ -158,7 +158,7 @@ def uncertainty(
     )
     rough, model = np.zeros(len(scene.nodes)), None
     if scene.space.confined:
-        model = model_error(scene, found, views, weights, still, columns, lack, summed, total, motion)
+        model = model_error(scene, found, views, weights, still, columns, lack, summed, total, motion, system.motion)
     else:
         rough = unresolved(scene, left, total, summed.fitted)
     shifts = np.zeros((len(system.cross), 0))

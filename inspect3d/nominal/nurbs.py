@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from inspect3d.arrays import Floats, Integers, floats, unit
+from inspect3d.arrays import Floats, Indices, floats, unit
 from inspect3d.pose import Pose
 
 STEPS, ARRIVED = 30, 1e-10  # mm
@@ -83,7 +83,9 @@ class Nurbs:
         columns, values = self._weighed(uv)
         turned = np.empty((*values.shape, ways))
         turn_towards(columns, self.frames[:, :ways], np.ascontiguousarray(towards), values, turned)
-        each, wide = ways * columns[:, :, None] + np.arange(ways), (len(uv), ways * columns.shape[1])
+        each = np.empty(turned.shape, dtype=np.int32)
+        each[:] = ways * columns[:, :, None] + np.arange(ways)
+        wide = (len(uv), ways * columns.shape[1])
         return self._spread(each.reshape(wide), turned.reshape(wide), ways)
 
     def points(self, uv: Floats) -> Floats:
@@ -98,9 +100,14 @@ class Nurbs:
         write_places(self._net, *self.degrees, self._within(uv), found)
         return found[:, :3].copy(), found[:, 3:6].copy(), found[:, 6:].copy()
 
-    def normals(self, uv: Floats) -> Floats:
-        """Return the outward normals (n, 3), unit; at a pole, where a derivative vanishes, those a little inside."""
-        _, along_u, along_v = self.tangents(uv)
+    def normals(self, uv: Floats, tangents: tuple[Floats, Floats] | None = None) -> Floats:
+        """Return the outward normals (n, 3), unit; at a pole, where a derivative vanishes, those a little inside.
+
+        Parameters
+        ----------
+        tangents : dS/du and dS/dv there, where they are known
+        """
+        along_u, along_v = tangents or self.tangents(uv)[1:]
         cross = np.cross(along_u, along_v)
         flat = np.linalg.norm(cross, axis=1) <= 1e-9 * (along_u**2 + along_v**2).sum(axis=1)
         if flat.any():
@@ -175,18 +182,18 @@ class Nurbs:
         """Return the surface grown about the origin by a scale, and then moved by a pose."""
         return replace(self, poles=pose(scale * self.poles.reshape(-1, 3)).reshape(self.poles.shape))
 
-    def _weighed(self, uv: Floats) -> tuple[Integers, Floats]:
+    def _weighed(self, uv: Floats) -> tuple[Indices, Floats]:
         """Return which control points weigh at parameters (n, 2), and how much, (n, (p + 1) (q + 1))."""
         from inspect3d.nominal.nurbs_kernel import write_functions
 
         p, q = self.degrees
         shape = (len(uv), (p + 1) * (q + 1))
-        columns, values = np.empty(shape, dtype=np.int64), np.empty(shape)
+        columns, values = np.empty(shape, dtype=np.int32), np.empty(shape)
         write_functions(self._net, p, q, self._within(uv), columns, values)
         return columns, values
 
-    def _spread(self, columns: Integers, values: Floats, ways: int = 1) -> sparse.csr_matrix:
-        starts = np.arange(len(values) + 1) * values.shape[1]
+    def _spread(self, columns: Indices, values: Floats, ways: int = 1) -> sparse.csr_matrix:
+        starts = np.arange(len(values) + 1, dtype=np.int32) * values.shape[1]
         return sparse.csr_matrix((values.ravel(), columns.ravel(), starts), shape=(len(values), ways * self.size))
 
     @property

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from inspect3d.arrays import Floats, Integers
+from inspect3d.arrays import Floats, Indices
 
 CHUNKS = 64
 SINGULAR = 1e-12
@@ -96,7 +96,7 @@ def write_places(net: Net, p: int, q: int, uv: Floats, found: Floats) -> None:
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def write_functions(net: Net, p: int, q: int, uv: Floats, columns: Integers, values: Floats) -> None:
+def write_functions(net: Net, p: int, q: int, uv: Floats, columns: Indices, values: Floats) -> None:
     """Write which control points weigh at parameters (n, 2) within the bounds, and how much, (n, (p + 1) (q + 1))."""
     weights = net[1]
     across, along = weights.shape
@@ -117,7 +117,7 @@ def write_functions(net: Net, p: int, q: int, uv: Floats, columns: Integers, val
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def turn_towards(columns: Integers, frames: Floats, normals: Floats, values: Floats, turned: Floats) -> None:
+def turn_towards(columns: Indices, frames: Floats, normals: Floats, values: Floats, turned: Floats) -> None:
     """Write values (n, w) times the shares of directions (k, d, 3), by columns, along normals (n, 3): (n, w, d)."""
     ways = frames.shape[1]
     for chunk in prange(CHUNKS):
