@@ -232,10 +232,13 @@ def _triangulated(views: Sequence[View], pixels: Sequence[Floats], start: Floats
 
 
 def modes_of(shape: Shape, trial: Trial) -> tuple[Floats, Floats]:
-    """Return the motions of the part that its cameras allow (n, g), and those listed as hidden or weak (n, k)."""
+    """Return the motions of the part that its cameras allow (n, g), and those listed as hidden or weak (n, k).
+
+    The former are all that move the surface by a thousandth of their size or more: none of them is an error of the map.
+    """
     hidden = [motion.pattern for motion in shape.hidden if np.isfinite(motion.sigma)]
     weak = np.stack(hidden, axis=1) if hidden else np.zeros((len(shape.scene.nodes), 0))
-    return gauge_of(shape.scene, trial.freedom), weak
+    return gauge_of(shape.scene, trial.freedom, HAIR**2), weak
 
 
 def remover(modes: Floats, sound: Booleans) -> Floats:

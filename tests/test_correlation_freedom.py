@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import sparse
 
+from inspect3d.arrays import unit
 from inspect3d.camera import View
 from inspect3d.correlation import solver
+from inspect3d.correlation.dense import DenseFactor, cholesky
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.hidden import hidden_motions
 from inspect3d.correlation.linear import gauge_of, motions_of, moving_cameras, slides_of, system_of
 from inspect3d.correlation.normal import facets
 from inspect3d.correlation.picture import Pictures
 from inspect3d.correlation.seen import scene
-from inspect3d.correlation.still import SOFT, in_gauge, slid, stilled
+from inspect3d.correlation.still import SOFT, in_gauge, left_open, slid, stilled
+from inspect3d.correlation.system import System
 from inspect3d.correlation.systematic import Systematic
 from inspect3d.pose import Pose
 from inspect3d.register.gauge import FREE
@@ -139,6 +144,43 @@ def test_to_keep_a_narrow_plane_still_nothing_tilts_it(flat):
     )
     assert np.abs(shape).max() < 0.1
     assert slid(strip, views, free.moved(views, after)) < 1.2 * slid(strip, views, free.moved(views, cameras))
+
+
+def test_cameras_beside_slides_move_across_none_of_what_holds_them():
+    random = np.random.default_rng(0)
+    root = random.normal(size=(14, 14))
+    matrix = root @ root.T + np.eye(14)
+    slides, across = random.normal(size=(2, 6, 2))
+    system = System(
+        DenseFactor(cholesky(matrix[:8, :8])), matrix[:8, 8:], matrix[8:, 8:], np.zeros((8, 0)),
+        np.ones(6), np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), slides, np.zeros((6, 0)), across=across,
+    )  # fmt: skip
+    right = random.normal(size=14)
+    shape, cameras = system.solve(right[:8], right[8:])
+    assert across.T @ cameras == pytest.approx(np.zeros(2), abs=1e-12)
+    assert (matrix @ np.append(shape, cameras) - right)[:8] == pytest.approx(np.zeros(8), abs=1e-9)
+    pulled = right[8:] - matrix[8:] @ np.append(shape, cameras) - cameras
+    assert across @ np.linalg.lstsq(across, pulled)[0] == pytest.approx(pulled, abs=1e-9)
+
+
+def test_a_start_that_is_off_by_a_pixel_leaves_open_what_that_makes_of_a_nearly_flat_sheet(flat):
+    _, views, seen = flat
+    free = Freedom("free", (Lens(),) * 2, views, seen.centre)
+    assert np.abs(left_open(seen, free, views)).max() < 1e-9
+    x, y = ((seen.nodes - seen.centre) / seen.extent).T[:2]
+    slopes = 0.05 * np.column_stack([x**2 + 2 * x * y, y**3 - x**2, np.zeros(len(x))])
+    wavy = replace(seen, normals=unit(seen.normals + slopes))
+    _, values, right = motions_of(wavy, free)
+    held = values**2 <= FREE * values[0] ** 2
+    left = left_open(wavy, free, views)
+    assert held.any()
+    for motion, field in zip(right[held], left.T, strict=True):
+        places = wavy.nodes - wavy.centre
+        moved = np.cross(motion[:3], places) + motion[3:6] + motion[6] * places
+        one = moved * (np.abs(field).max() / np.abs((moved * wavy.normals).sum(axis=1)).max())
+        assert np.abs((one * wavy.normals).sum(axis=1)) == pytest.approx(np.abs(field), abs=1e-9)
+        pixels = np.mean([view.project(wavy.nodes + 1e-3 * one) - view.project(wavy.nodes) for view in views], axis=0)
+        assert np.sqrt((pixels**2).sum(axis=1).mean()) == pytest.approx(1e-3, rel=0.02)
 
 
 def test_a_state_in_the_gauge_has_no_motion_of_the_part_and_shows_the_same_pictures(wavy):

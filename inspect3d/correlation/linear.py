@@ -32,16 +32,20 @@ def noise_of(found: Facets, weights: Floats, unknowns: int) -> float:
     return float(weights @ found.energy) / max(freedom, 1.0)
 
 
-def gauge_of(scene: Scene, freedom: Freedom) -> Floats:
+def gauge_of(scene: Scene, freedom: Freedom, share: float = FREE) -> Floats:
     """Return orthonormal columns (n, g) of the fields that the unknown poses can imitate.
 
     They are the motions of the part as a whole and, where each camera has a pose of its own, its growth. What leaves
     the surface in itself is not among them; see `slides_of`.
+
+    Parameters
+    ----------
+    share : of the stiffest motion's stiffness, up to which a motion is taken to leave the surface in itself
     """
     if freedom.poses == "known":
         return np.zeros((len(scene.nodes), 0))
     left, values, _ = motions_of(scene, freedom)
-    return left[:, values**2 > FREE * values[0] ** 2]
+    return left[:, values**2 > share * values[0] ** 2]
 
 
 def slides_of(scene: Scene, freedom: Freedom, views: Sequence[View], share: float = FREE) -> Floats:
@@ -95,6 +99,7 @@ def system_of(
     stiffness: float = 0.0,
     shift: ShiftBlocks | None = None,
     motion: Factored | None = None,
+    across: Floats | None = None,
 ) -> System:
     """Return the normal equations.
 
@@ -108,6 +113,7 @@ def system_of(
     stiffness : see `inspect3d.correlation.space.plates`
     shift : what the pictures show of a smooth shift of them, as unknowns beside the cameras
     motion : the matrix of the shape factored, where it is known
+    across : (m, s), see `System`
     """
     space, weights = scene.space, (factors / noise)[:, None, None]
     if motion is None:
@@ -117,7 +123,7 @@ def system_of(
     cross = space.gathered(scene, found.cross * weights) @ mixing
     camera = mixing.T @ found.camera @ mixing / noise
     if shift is None:
-        return System(motion, cross, camera, gauge, 1 / sigmas**2, scale, slides, freedom.redundant)
+        return System(motion, cross, camera, gauge, 1 / sigmas**2, scale, slides, freedom.redundant, across=across)
     count = len(shift.scale)
     return System(
         motion,
@@ -129,4 +135,5 @@ def system_of(
         np.pad(slides, ((0, count), (0, 0))),
         np.pad(freedom.redundant, ((0, count), (0, 0))),
         count,
+        None if across is None else np.pad(across, ((0, count), (0, 0))),
     )

@@ -20,7 +20,7 @@ from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.shift import Shift, needed_columns, shift_blocks, shift_of
 from inspect3d.correlation.space import Factored, Matrix
 from inspect3d.correlation.state import ON_NOMINAL, Level, State, Step
-from inspect3d.correlation.still import stilled
+from inspect3d.correlation.still import across_slides, stilled
 from inspect3d.correlation.systematic import Systematic
 from inspect3d.outcome import MeasurementError
 from inspect3d.register.gauge import FREE
@@ -227,7 +227,10 @@ def _step(
     if known is not None:
         blocks = shift_blocks(scene, found, columns, mixing, known, factors / noise, state.weights / noise)
         camera_right = np.concatenate([camera_right, blocks.right])
-    system = system_of(scene, found, factors, noise, freedom, columns, scale, slides, level.stiffness, blocks)
+    across = across_slides(scene, freedom, state.views, slides)
+    system = system_of(
+        scene, found, factors, noise, freedom, columns, scale, slides, level.stiffness, blocks, across=across
+    )
     shape, together = system.solve(_equations(scene, found, noise, state, level)[1], camera_right)
     cameras, shift = np.split(together, [len(sigmas)])
     if freedom.poses == "free" or (freedom.poses == "common" and level.blur == 0):

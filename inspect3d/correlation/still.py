@@ -16,6 +16,7 @@ from inspect3d.register.gauge import FREE
 SOFT = 0.1  # share of the stiffest motion's stiffness; a motion that moves the surface in itself mostly has less
 FOLLOWED = 0.1  # of the motions in which the surface slides in itself: a space that misses less nearly has them
 SLIDING = 0.1  # of the slide that most slides the surface; a motion of the part that slides it less is none
+STARTED = 1.0  # px, by which a start may be off along a motion that is held
 SMALL = 1e-3  # mm, or of a motion of the part
 
 
@@ -66,6 +67,49 @@ def stilled(
     columns = [slide(SMALL * u, SMALL * p) / SMALL for u, p in zip(fields.T, changes.T, strict=True)]
     sizes = np.linalg.lstsq(np.stack(columns, axis=1), -slide(shape, cameras), rcond=SLIDING)[0]
     return shape + fields @ sizes, cameras + changes @ sizes
+
+
+def across_slides(scene: Scene, freedom: Freedom, views: Sequence[View], slides: Floats) -> Floats | None:
+    """Return N (m, s), with N'p = 0 where cameras do not slide the surface along slides in the mean of the pictures.
+
+    Changes of the lenses slide it as well: with the poses held along the slides themselves, splines on a sheet slid by
+    13 px. None where nodes move by themselves, which `stilled` keeps still, or nothing slides.
+
+    Parameters
+    ----------
+    slides : (m, s), see `slides_of`
+    """
+    if not (scene.space.confined and freedom.poses == "free" and slides.shape[1]):
+        return None
+    scale = freedom.scale(views, scene.sample)
+    flow = _flow(freedom, views, scene.sample, np.diag(scale)) / scale
+    return np.asarray(flow.T @ (flow @ slides))
+
+
+def left_open(scene: Scene, freedom: Freedom, views: Sequence[View]) -> Floats:
+    """Return what motions that are held make of the shape (k, s) if the start is off along them by a pixel.
+
+    A motion that leaves the surface nearly in itself is held where the start has it, and moves the shape a little all
+    the same: nothing but the start tells that.
+    """
+    none = np.zeros((scene.space.rows(scene).shape[1], 0))
+    if freedom.poses == "known":
+        return none
+    left, values, right = motions_of(scene, freedom)
+    held = values**2 <= FREE * values[0] ** 2
+    if not held.any():
+        return none
+    flow = _flow(freedom, views, scene.sample, moving_cameras(scene, freedom, views, right[held]))
+    sizes = STARTED / np.sqrt(2 * np.mean(flow**2, axis=0))
+    return scene.space.motion(scene, left[:, held] * values[held] * sizes)
+
+
+def _flow(freedom: Freedom, views: Sequence[View], points: Floats, changes: Floats) -> Floats:
+    """Return how changes (m, s) of the cameras move points (p, 3) in the mean of the pictures, (2 p, s) px."""
+    here = np.mean([view.project(points) for view in views], axis=0)
+    moved = [freedom.moved(views, SMALL * change) for change in changes.T]
+    there = [np.mean([view.project(points) for view in some], axis=0) for some in moved]
+    return np.stack([(places - here).ravel() for places in there], axis=1) / SMALL
 
 
 def slid(scene: Scene, start: Sequence[View], views: Sequence[View]) -> float:

@@ -33,6 +33,7 @@ class System:
     slides : (m, s) changes of the cameras that no picture shows, held
     redundant : (m, r) changes of the cameras that others stand for, held
     shifts : how many of the m unknowns, the last ones, are numbers of a smooth shift of the pictures
+    across : N (m, s), by which the slides are held, N'p = 0; none: by the slides themselves, in the units of `scale`
     """
 
     motion: Factored
@@ -44,6 +45,7 @@ class System:
     slides: Floats
     redundant: Floats
     shifts: int = 0
+    across: Floats | None = None
 
     @cached_property
     def held(self) -> tuple[Floats, Floats]:
@@ -78,9 +80,11 @@ class System:
         if not len(self.scale):
             return np.zeros((0, 0)), np.zeros((0, 0))
         both = self.scale * self.scale[:, None]
-        held = np.column_stack([self.slides, self.redundant]) / self.scale[:, None]
-        turned, _ = np.linalg.qr(held, mode="complete")
-        slides, others = turned[:, : self.slides.shape[1]], turned[:, held.shape[1] :]
+        slides = self.slides / self.scale[:, None]
+        across = slides if self.across is None else self.across * self.scale[:, None]
+        held = np.column_stack([across, self.redundant / self.scale[:, None]])
+        others = np.linalg.qr(held, mode="complete")[0][:, held.shape[1] :]
+        slides = np.linalg.qr(slides)[0]
         values, modes = np.linalg.eigh(others.T @ (self.reduced * both) @ others)
         modes = others @ modes
         silent = values <= NOTHING * float(np.linalg.eigvalsh(self.camera * both)[-1])

@@ -21,6 +21,7 @@ from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.shift import needed_columns, shift_blocks, shift_of, without_shift
 from inspect3d.correlation.smoothing import Smoothing
 from inspect3d.correlation.solver import held
+from inspect3d.correlation.still import across_slides, left_open
 from inspect3d.correlation.system import System
 from inspect3d.correlation.systematic import Systematic
 
@@ -34,7 +35,8 @@ class Uncertainty:
     Parameters
     ----------
     system : the information of the pictures and priors; its inverse is C
-    shifts : F (k, r), what of the systematic shift looks like a deviation, or is more than stated and moves the shape
+    shifts : F (k, r), what of the systematic shift looks like a deviation, or is more than stated and moves the shape;
+        and what of motions that are held the start leaves open, see `left_open`
     smoother : T (n, k), from the motions of the scene's space to the deviation of its nodes
     rough : m (n,) mm, of nodes where the elements do not fit, as at a step; 0 elsewhere. Of a smoothed map the bias too
     noise : variance of the residuals where they fit, grey levels²
@@ -153,18 +155,19 @@ def uncertainty(
     if known is not None and freedom.unknowns:
         blocks = shift_blocks(scene, found, columns, mixing, known, factors / total, weights / total)
     motion_factor = None if scene.space.confined else first.motion.times(before / total)
+    across = across_slides(scene, freedom, views, slides)
     system = system_of(
-        scene, found, factors, total, freedom, columns, scale, slides, shift=blocks, motion=motion_factor
+        scene, found, factors, total, freedom, columns, scale, slides, 0.0, blocks, motion_factor, across
     )
     rough, model = np.zeros(len(scene.nodes)), None
     if scene.space.confined:
         model = model_error(scene, found, views, weights, still, columns, lack, summed, total, motion, system.motion)
     else:
         rough = unresolved(scene, left, total, summed.fitted)
-    shifts = np.zeros((len(system.cross), 0))
+    shifts = left_open(scene, freedom, views)
     if systematic is not None and known is not None:
         looking = np.stack([scene.space.motion(scene, field) for field in known.deviation.T], axis=1)
-        shifts = size / systematic.size * looking
+        shifts = np.hstack([shifts, size / systematic.size * looking])
         if blocks is not None and size > systematic.size:
             response = system.solve(blocks.shape, np.vstack([blocks.cameras, blocks.own]))[0]
             shifts = np.hstack([shifts, np.sqrt((size / systematic.size) ** 2 - 1) * response])
