@@ -7,8 +7,9 @@
 FOLDER keeps the virtual photographs, which are made if they are not there: `milled` (dataset milled-photographs),
 `smooth` (the same views of the block with a smooth deviation, as benchmarks/sigma_of_clouds.py has it) and `steps`
 (with the steps of the milled block but without its scallops, which are finer than the elements), the last two for the
-test of the map's sigma. With --small it is made for so many seeds on five photographs of 612 x 512 px each, and nothing
-else is. DATA is the folder of the real photographs: robovision_stone and middlebury_temple_sparse_ring.
+test of the map's sigma. With --small it is made for so many seeds on five photographs of 612 x 512 px each, and so is
+the test of the centres of cameras whose places are unknown; nothing else is done. DATA is the folder of the real
+photographs: robovision_stone and middlebury_temple_sparse_ring.
 
 The truth is brought into the gauge of the map before it is compared. Seconds are of the processor.
 """
@@ -18,6 +19,7 @@ from __future__ import annotations
 import re
 import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from math import radians
 from pathlib import Path
@@ -32,6 +34,7 @@ from inspect3d.deviate.deviate import Deviate
 from inspect3d.files.calibration import Rig
 from inspect3d.files.calibration_json import write_calibration_json
 from inspect3d.files.cloud import read_cloud
+from inspect3d.files.photograph import read_photograph
 from inspect3d.measure import Files, Measurement
 from inspect3d.nominal.load import load_nominal
 from inspect3d.nominal.nominal import Nominal
@@ -40,6 +43,9 @@ from inspect3d.register.gauge import best_fit
 from inspect3d.register.landmarks import similarity_from_landmarks
 from inspect3d.register.register import Register
 from inspect3d.register.similarity import Similarity
+from inspect3d.triangulation.centre_sigma import centre_sigma
+from inspect3d.triangulation.features import FindFeatures
+from inspect3d.triangulation.tie import Tie
 from inspect3d.virtual.deviation_field import Bump, Wave
 from inspect3d.virtual.milled import MilledSizes, machining
 from inspect3d.virtual.picture_truth import PictureTruth
@@ -55,6 +61,8 @@ def main(folder: Path, data: Path | None) -> None:
         placed(folder / name)
     lenses_given(folder / "milled", 0.0)
     lenses_given(folder / "milled", None)
+    for free in (False, True):
+        centres(folder / "milled", free)
     if data is not None:
         stone(data / "robovision_stone")
         temple(data / "middlebury_temple_sparse_ring")
@@ -72,6 +80,9 @@ def small(folder: Path, seeds: int) -> None:
             z = np.concatenate([pair[k] for pair in pairs])
             if len(z):
                 print(f"{name}, {seeds} sets, {where}: {spread(z)}")
+    for free in (False, True):
+        z = np.concatenate([centres(folder / f"smooth{seed}", free) for seed in range(1, seeds + 1)])
+        print(f"centres, {seeds} sets, lenses {'free' if free else 'given'}: rms of error/sigma {rms(z):.2f}")
 
 
 def made(folder: Path, name: str, seed: int, rig: StereoRig | None) -> None:
@@ -136,6 +147,32 @@ def lenses_given(folder: Path, focal_error: float | None) -> None:
     map_against_truth(found, nominal, truth, None, 2.0 * ("smooth" not in folder.name))
 
 
+def centres(folder: Path, free: bool) -> Floats:
+    """Print whether the uncertainty of the centres is true, lenses given or free from 3 % off; return error over it."""
+    truth = PictureTruth.read(folder / "truth.json")
+    lenses = [view.camera for view in truth.views]
+    focal = 1.03 * float(np.mean([lens.matrix[0, 0] for lens in lenses]))
+    features = [FindFeatures()(read_photograph(folder / name)) for name in names(truth)]
+    begun: Sequence[Camera | float] = [focal] * len(lenses) if free else lenses
+    tied = Tie().free(names(truth), features, begun, [lens.size for lens in lenses])
+    pairs = [(one, true) for one, true in zip(tied.views, truth.views, strict=True) if one is not None]
+    found, true = (np.array([view.centre for view in views]) for views in zip(*pairs, strict=True))
+    fit = similarity_from_landmarks(found, true, grows=True)
+    sigma = centre_sigma(tied, free, Colmap().systematic)
+    sigma = fit.scale * sigma[np.isfinite(sigma)]
+    z = (fit(found) - true) / sigma[:, None]
+    print(
+        f"{folder.name}, lenses {'free' if free else 'given'}: {len(found)} of {len(lenses)} placed, centres "
+        f"{gaps(fit(found), true)}, sigma {np.median(sigma):.4f} mm along each axis; rms of error/sigma {rms(z):.2f}"
+    )
+    return z
+
+
+def rms(z: Floats) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(z**2)))
+
+
 def names(truth: PictureTruth) -> list[str]:
     """Return the file names of virtual photographs."""
     return [f"view{k}.png" for k in range(1, len(truth.views) + 1)]
@@ -187,7 +224,7 @@ def map_against_truth(
 def spread(z: Floats) -> str:
     """Return how errors over their sigma spread, in words."""
     inside = 100 * np.mean(np.abs(z) < 1.96)
-    return f"rms of error/sigma {np.sqrt(np.mean(z**2)):.3f}, {inside:.1f} % in the 95 % interval ({len(z)} nodes)"
+    return f"rms of error/sigma {rms(z):.3f}, {inside:.1f} % in the 95 % interval ({len(z)} nodes)"
 
 
 def stone(folder: Path) -> None:

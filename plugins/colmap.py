@@ -277,7 +277,8 @@ def _centre_words(tied: TiePoints, rig: Rig | None, systematic: float) -> tuple[
     return (
         f"The centres of the cameras are known to {np.median(shares):.2g} µm, at the most {shares.max():.2g} µm, in "
         "each metre of their distance to the part, against each other and along each axis (standard uncertainty, by "
-        f"the bundle adjustment with the lenses {'free' if rig is None else 'given'}).",
+        "the bundle adjustment with the lenses "
+        f"{'given' if rig else 'free and their axes half a per cent of the picture off its middle'}).",
     )
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from inspect3d.camera import Camera, View
 from inspect3d.pose import Pose
-from inspect3d.triangulation.centre_sigma import centre_sigma
-from inspect3d.triangulation.tie import TiePoints
+from inspect3d.triangulation.centre_sigma import OFF_MIDDLE, centre_sigma, robust_variance
+from inspect3d.triangulation.tie import TiePoints, loss_scale
 
 VIEWS, POINTS = 4, 40
 
@@ -48,16 +48,20 @@ def changed(ties, x, size):
     return views, ties.points + x[VIEWS * size :].reshape(-1, 3)
 
 
-def shifts(ties):
-    """Return shifts of each picture, constant and linear in its pixels: all pixels' coordinates in a row, (n, 6 v)."""
+def shifts(ties, systematic, middle):
+    """Return the shifts of each picture: all pixels' coordinates in a row, (n, 6 v).
+
+    They are constant and linear in its pixels, the constant one also for the middle of the lens (px).
+    """
     columns = []
     for k in range(VIEWS):
         here = ties.view == k
         away = ties.pixels[here] - ties.pixels[here].mean(axis=0)
-        for form in (np.ones(POINTS), *(away / away.std(axis=0)).T):
+        whole = np.full(POINTS, np.hypot(systematic / np.sqrt(3), middle))
+        for form in (whole, *(systematic / np.sqrt(3) * away / away.std(axis=0)).T):
             for axis in range(2):
                 column = np.zeros(ties.pixels.shape)
-                column[here, axis] = form / np.sqrt(3)
+                column[here, axis] = form
                 columns.append(column.ravel())
     return np.stack(columns, axis=1)
 
@@ -79,9 +83,9 @@ def test_centres_are_known_as_the_inverse_of_the_whole_normal_matrix_says(free, 
     both = [(pixels(e) - pixels(-e), centres(e) - centres(-e)) for e in np.diag(steps)]
     slopes, moves = (np.stack(columns, axis=1) / 2 for columns in zip(*both, strict=True))
     misses = ties.pixels.ravel() - pixels(np.zeros(len(steps)))
-    noise = misses @ misses / (len(misses) - len(steps) + 7)
+    noise = robust_variance(misses.reshape(-1, 2)) * len(misses) / (len(misses) - len(steps) + 7)
     inverse = moves @ np.linalg.pinv(slopes.T @ slopes, 1e-14, hermitian=True)
-    by_shifts = shift * inverse @ slopes.T @ shifts(ties)
+    by_shifts = inverse @ slopes.T @ shifts(ties, shift, free * OFF_MIDDLE * 1000)
     covariance = noise * inverse @ moves.T + by_shifts @ by_shifts.T
     away = np.array([view.centre for view in ties.views])
     away -= away.mean(axis=0)
@@ -99,3 +103,16 @@ def test_the_uncertainty_grows_with_the_unit_and_cameras_that_were_not_placed_ha
     kept = fewer.view < 3
     fewer = replace(fewer, point=one.point[kept], view=one.view[kept], pixels=one.pixels[kept])
     assert np.isnan(centre_sigma(fewer, False, 0.01)).tolist() == [False, False, False, True]
+
+
+def test_the_robust_variance_is_how_much_a_mean_with_those_weights_scatters():
+    """Of normal errors with one in fifty ten times as large; means of 100, found by reweighting."""
+    random = np.random.default_rng(2)
+    errors = random.normal(0, 0.1, (2000, 100, 2)) * np.where(random.random((2000, 100, 1)) < 0.02, 10, 1)
+    scale = loss_scale(errors.reshape(-1, 2))
+    means = np.zeros((2000, 1, 2))
+    for _ in range(20):
+        weights = 1 / (1 + ((errors - means) ** 2).sum(axis=2, keepdims=True) / scale**2)
+        means = (weights * errors).sum(axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True)
+    assert robust_variance(errors.reshape(-1, 2)) == pytest.approx(100 * np.mean(means**2), rel=0.08)
+    assert robust_variance(errors.reshape(-1, 2)) < 0.5 * np.mean(errors**2)

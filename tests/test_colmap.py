@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from math import radians
 
@@ -19,6 +20,7 @@ from inspect3d.nominal.load import load_nominal
 from inspect3d.outcome import InputError, MeasurementError
 from inspect3d.pose import Pose
 from inspect3d.register.gauge import best_fit
+from inspect3d.register.landmarks import similarity_from_landmarks
 from inspect3d.register.register import Register
 from inspect3d.triangulation.patches import FitPatches
 from inspect3d.triangulation.scale_bar import Mark, ScaleBar
@@ -188,13 +190,40 @@ def test_a_photograph_without_speckle_is_named(folder, tmp_path, nominal):
         Colmap()(source, nominal)
 
 
-def test_photographs_of_different_things_do_not_fit_together(folder, tmp_path, nominal):
-    noise = np.random.default_rng(0).normal(size=(512, 612))
-    other = cv2.GaussianBlur(noise, (0, 0), 2.0)
-    cv2.imwrite(str(tmp_path / "other.png"), cv2.normalize(other, None, 0, 255, cv2.NORM_MINMAX).astype(np.uint8))
-    source = Colmap(focal=2050.0).open(Files(folder, {"images": (folder / NAMES[0], tmp_path / "other.png")}))
+@pytest.fixture
+def other(tmp_path):
+    """A photograph of something else."""
+    noise = cv2.GaussianBlur(np.random.default_rng(0).normal(size=(512, 612)), (0, 0), 2.0)
+    path = tmp_path / "other.png"
+    cv2.imwrite(str(path), cv2.normalize(noise, None, 0, 255, cv2.NORM_MINMAX).astype(np.uint8))
+    return path
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_photographs_of_different_things_do_not_fit_together(folder, tmp_path, nominal, truth, other, known):
+    paths = {"images": (folder / NAMES[0], other)}
+    if known:
+        two = truth.views[:2]
+        rig = Rig(tuple(v.camera for v in two), camera_from_cad=tuple(v.camera_from_cad for v in two))
+        write_calibration_json(tmp_path / "two.json", rig)
+        paths["cameras"] = (tmp_path / "two.json",)
+    method = Colmap(focal=None if known else 2050.0)
     with pytest.raises(MeasurementError, match="do not fit together"):
-        Colmap(focal=2050.0)(source, nominal)
+        method(method.open(Files(folder, paths)), nominal)
+
+
+def test_a_rough_focal_length_places_all_cameras_as_well_as_is_said_and_leaves_out_what_shows_something_else(
+    folder, nominal, truth, other
+):
+    method = Colmap(focal=1.03 * 2050.0)
+    found = method(method.open(Files(folder, {"images": (*(folder / name for name in NAMES), other)})), nominal)
+    assert any("other.png could not be placed" in remark for remark in found.remarks)
+    (said,) = [remark for remark in found.remarks if "centres of the cameras are known" in remark]
+    share = 1e-6 * float(re.search(r"known to ([\d.e+]+) µm", said)[1])
+    centres, true = (np.array([view.centre for view in views]) for views in (found.views, truth.views))
+    off = similarity_from_landmarks(centres, true, grows=True)(centres) - true
+    sigma = share * np.linalg.norm(true - nominal.mesh.nodes.mean(axis=0), axis=1)[:, None]
+    assert np.sqrt(np.mean((off / sigma) ** 2)) < 1.5
 
 
 def test_a_photograph_that_asks_to_be_turned_is_told_of(folder, tmp_path):
