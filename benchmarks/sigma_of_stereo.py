@@ -71,7 +71,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cases", nargs="*", metavar="CASE", help=f"{', '.join(CASES)}; default: known")
     parser.add_argument("--seeds", type=int, default=40)
-    parser.add_argument("--part", choices=("freeform", "milled"), default="freeform")
+    parser.add_argument("--part", choices=("freeform", "smooth", "milled"), default="freeform")
     parser.add_argument("--cameras", type=int, default=2)
     parser.add_argument("--full", action="store_true", help="5 megapixels in place of a quarter of that")
     parser.add_argument("--element", type=float, help="mm; default 4.6, full 2.7")
