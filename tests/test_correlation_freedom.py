@@ -11,6 +11,7 @@ from scipy import sparse
 from inspect3d.arrays import unit
 from inspect3d.camera import View
 from inspect3d.correlation import solver
+from inspect3d.correlation.bounded_step import bounded
 from inspect3d.correlation.dense import DenseFactor, cholesky
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.hidden import hidden_motions
@@ -18,7 +19,8 @@ from inspect3d.correlation.linear import gauge_of, motions_of, moving_cameras, s
 from inspect3d.correlation.normal import facets
 from inspect3d.correlation.picture import Pictures
 from inspect3d.correlation.seen import scene
-from inspect3d.correlation.still import SOFT, in_gauge, left_open, slid, stilled
+from inspect3d.correlation.state import State
+from inspect3d.correlation.still import SOFT, in_gauge, left_open, slid, still_in_pictures, stilled
 from inspect3d.correlation.system import System
 from inspect3d.correlation.systematic import Systematic
 from inspect3d.pose import Pose
@@ -26,6 +28,8 @@ from inspect3d.register.gauge import FREE
 from tests.seen_sheets import ALL, STEEPEST, accumulated, flat_sheet, wavy_sheet
 from tests.sheets import plane, plane_normals, sheet
 from tests.speckled import Speckle, picture, rig
+
+NOISE = 2.4  # grey levels
 
 
 @pytest.fixture(scope="module")
@@ -130,10 +134,75 @@ def test_a_stilled_step_slides_no_more_than_it_must_and_shows_the_same_dispariti
     assert np.abs(still.mean(axis=(0, 1))).max() < 0.02 * np.abs(plain.mean(axis=(0, 1))).max()
 
 
+def test_a_step_that_keeps_the_surface_still_shows_the_same_disparities_as_one_that_lets_it_slide(wavy):
+    _, views, seen, stack = wavy
+    free = Freedom("free", (Lens(30.0, 10.0),) * 2, views, seen.centre)
+    still = still_in_pictures(seen, free, views)
+    off = free.moved(views, 0.1 * free.scale(views, seen.nodes) * np.random.default_rng(0).normal(size=free.unknowns))
+    pictured = accumulated(seen, stack, off, columns=free.columns)
+    right = seen.space.gathered(seen, pictured.right) / NOISE**2
+    pull = free.spread(free.columns)[0].T @ pictured.camera_right / NOISE**2
+    found = []
+    for held in (None, still):
+        shape, cameras = camera_system(seen, stack, off, free, held).solve(right, pull)
+        found.append(slides(seen, off, free.moved(off, 0.1 * cameras), 0.1 * shape))
+    assert np.abs(still.across.T @ cameras).max() < 1e-6 * np.abs(still.across.T * cameras).max()
+    apart = [each[0] - each[1] for each in found]
+    assert apart[1] == pytest.approx(apart[0], abs=1e-2 * np.abs(apart[0]).max())
+
+
+@pytest.mark.parametrize("slide", [-0.2, 0.2])
+def test_shape_and_cameras_are_found_with_the_surface_where_it_started_along_itself(wavy, slide):
+    _, views, seen, _ = wavy
+    free = Freedom("free", (Lens(30.0, 10.0),) * 2, views, seen.centre)
+    aside = free.moved(views, slide * moving_cameras(seen, free, views, motions_of(seen, free)[2])[:, -1])
+    state = solver.Solver((solver.Level(0, 0, 20),))(seen, photographed_wave(views), aside, free)
+    assert state.settled
+    assert slid(seen, views, aside) > 1.0
+    assert slid(seen, aside, state.views) < 0.2
+
+
+def test_a_bounded_step_moves_the_pictures_apart_by_the_bound_and_slides_as_it_likes(wavy):
+    _, views, seen, _ = wavy
+    free = Freedom("free", (Lens(),) * 2, views, seen.centre)
+    flat, still = np.zeros(len(seen.nodes)), np.zeros(free.unknowns)
+    state = State(flat, flat, tuple(views), np.ones(len(seen.triangles)))
+
+    def apart(lift):
+        moved = np.stack([view.project(seen.nodes + lift[:, None] * seen.normals) for view in views])
+        moved -= [view.project(seen.nodes) for view in views]
+        return np.sqrt(((moved - moved.mean(axis=0)) ** 2).sum(axis=2).mean(axis=0))
+
+    slide = 5.0 * moving_cameras(seen, free, views, np.eye(7)[3:4])[:, 0]
+    assert slid(seen, views, free.moved(views, slide)) > 20
+    assert bounded(seen, state, free, flat, slide, 5.0)[1] == pytest.approx(slide)
+    lifted, _ = bounded(seen, state, free, flat + 0.5, still, 0.3)
+    assert np.sqrt((apart(lifted) ** 2).mean()) == pytest.approx(0.3, rel=1e-2)
+    assert bounded(seen, state, free, flat + 1e-3, still, 0.3)[0] == pytest.approx(flat + 1e-3)
+    lone = flat + 1e-3
+    lone[7] = 1.0
+    lifted, _ = bounded(seen, state, free, lone, still, 0.3)
+    assert apart(lifted)[7] == pytest.approx(0.6, rel=1e-2)
+    assert np.delete(lifted, 7) == pytest.approx(np.delete(lone, 7))
+
+
+def narrow(seen):
+    """Return a strip of a sheet."""
+    middles = seen.nodes[seen.triangles].mean(axis=1)
+    return seen.restricted(np.abs(middles[:, 1] - seen.centre[1]) < 0.1 * np.ptp(seen.nodes[:, 1]))[0]
+
+
+def test_a_tilt_of_a_narrow_plane_is_not_taken_for_a_slide(flat):
+    _, views, seen = flat
+    strip = narrow(seen)
+    still = still_in_pictures(strip, Freedom("free", (Lens(),) * 2, views, strip.centre), views)
+    assert still.slides.shape[1] == 4  # two shifts, a turn, growth
+    assert still.gauge.shape[1] == 3
+
+
 def test_to_keep_a_narrow_plane_still_nothing_tilts_it(flat):
     _, views, seen = flat
-    middles = seen.nodes[seen.triangles].mean(axis=1)
-    strip, _ = seen.restricted(np.abs(middles[:, 1] - seen.centre[1]) < 0.1 * np.ptp(seen.nodes[:, 1]))
+    strip = narrow(seen)
     free = Freedom("free", (Lens(),) * 2, views, strip.centre)
     _, values, _ = motions_of(strip, free)
     assert np.count_nonzero(values**2 <= SOFT * values[0] ** 2) == 5  # two shifts, a turn, growth, and a tilt
@@ -153,7 +222,7 @@ def test_cameras_beside_slides_move_across_none_of_what_holds_them():
     slides, across = random.normal(size=(2, 6, 2))
     system = System(
         DenseFactor(cholesky(matrix[:8, :8])), matrix[:8, 8:], matrix[8:, 8:], np.zeros((8, 0)),
-        np.ones(6), np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), slides, np.zeros((6, 0)), across=across,
+        np.ones(6), np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), slides, across, np.zeros((6, 0)),
     )  # fmt: skip
     right = random.normal(size=14)
     shape, cameras = system.solve(right[:8], right[8:])
@@ -207,13 +276,13 @@ def slides(seen, views, after, shape):
     return np.stack(found)
 
 
-def camera_system(seen, stack, views, free):
-    """Return the linear system at the nominal shape for noise of 2.4 grey levels."""
+def camera_system(seen, stack, views, free, still=None):
+    """Return the linear system at the nominal shape."""
     found = accumulated(seen, stack, views, columns=free.columns)
     slides = slides_of(seen, free, views)
-    return system_of(
-        seen, found, np.ones(len(found.node)), 2.4**2, free, free.columns, free.scale(views, seen.nodes), slides
-    )
+    scale = free.scale(views, seen.nodes)
+    even = np.ones(len(found.node))
+    return system_of(seen, found, even, NOISE**2, free, free.columns, scale, slides, still=still)
 
 
 def test_moving_the_part_before_the_cameras_is_moving_its_nodes(wavy):

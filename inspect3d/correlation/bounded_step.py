@@ -1,4 +1,4 @@
-"""A step of the cameras before a shape that is held, no longer than the pictures can tell."""
+"""A step no longer than the pictures can tell: of the cameras before a shape that is held, or of both."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from inspect3d.arrays import Floats
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
 from inspect3d.correlation.scene import Scene
+from inspect3d.correlation.state import State
 
+LONGEST = 2.0  # times the bound, of one node
+SMALL = 1e-12  # px
 VAGUE = 1e-6  # share of the stiffest motion's stiffness; softer ones are held
 
 
@@ -44,3 +47,28 @@ def bounded_step(
         if not ((there - here) ** 2).sum(axis=1).mean() > farthest**2:
             return cameras
         damping = max(2 * damping, VAGUE)
+
+
+def bounded(
+    scene: Scene, state: State, freedom: Freedom, shape: Floats, cameras: Floats, farthest: float
+) -> tuple[Floats, Floats]:
+    """Return a step of shape and cameras, shortened until the pictures move apart by no more than a bound.
+
+    What moves all pictures alike, or hardly moves them, may go as far as it likes. Of nodes that each stand for one
+    unknown, none moves the pictures apart by more than twice the bound: a few facets by themselves, seen steeply, may
+    ask for many times that.
+
+    Parameters
+    ----------
+    shape : (k,) mm, of the unknowns of the scene's space
+    cameras : (m,)
+    farthest : px, rms over the nodes and the pictures, from where a node goes in the mean of the pictures
+    """
+    here = scene.nodes + state.deviation[:, None] * scene.normals
+    there = here + (scene.space.rows(scene) @ shape)[:, None] * scene.normals
+    views = zip(state.views, freedom.moved(state.views, cameras), strict=True)
+    moved = np.stack([now.project(there) - then.project(here) for then, now in views])
+    apart = np.sqrt(((moved - moved.mean(axis=0)) ** 2).sum(axis=2).mean(axis=0))
+    share = min(1.0, farthest / max(float(np.sqrt((apart**2).mean())), SMALL))
+    each = 1.0 if scene.space.confined else np.minimum(1.0, LONGEST * farthest / np.maximum(share * apart, SMALL))
+    return share * each * shape, share * cameras

@@ -18,7 +18,13 @@ from inspect3d.correlation.state import Step
 from inspect3d.figure import Descent, Figure, PixelMap
 from inspect3d.nominal.nominal import Nominal
 
-MOVES = {"poses": "poses", "cameras": "cameras", "shape": "shape", "both": "cameras and shape"}
+MOVES = {
+    "poses": "poses",
+    "cameras": "cameras",
+    "shape": "shape",
+    "placed": "poses and shape",
+    "both": "cameras and shape",
+}
 
 
 def illustrated(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -87,6 +88,22 @@ def motions_of(scene: Scene, freedom: Freedom) -> tuple[Floats, Floats, Floats]:
     return left, values, right / units
 
 
+@dataclass(frozen=True, eq=False)
+class Still:
+    """How motions in which the surface slides in itself are held where its pictures are.
+
+    Parameters
+    ----------
+    gauge : (n, g) fields of the other motions, which the shape leaves to the cameras
+    slides : (m, s) changes of the cameras that make these
+    across : N (m, s), N'p = 0 where the surface keeps still in the mean of the pictures
+    """
+
+    gauge: Floats
+    slides: Floats
+    across: Floats
+
+
 def system_of(
     scene: Scene,
     found: Facets,
@@ -99,7 +116,7 @@ def system_of(
     stiffness: float = 0.0,
     shift: ShiftBlocks | None = None,
     motion: Factored | None = None,
-    across: Floats | None = None,
+    still: Still | None = None,
 ) -> System:
     """Return the normal equations.
 
@@ -109,21 +126,22 @@ def system_of(
     noise : variance of the residuals, grey levels²
     columns : camera parameters of each view in `found`
     scale : (m,) of each camera unknown, what moves the pictures by one pixel; see `Freedom.scale`
-    slides : (m, s), see `slides_of`
+    slides : (m, s), see `slides_of`; the step of the cameras, in units of their scale, is at right angles to them
     stiffness : see `inspect3d.correlation.space.plates`
     shift : what the pictures show of a smooth shift of them, as unknowns beside the cameras
     motion : the matrix of the shape factored, where it is known
-    across : (m, s), see `System`
+    still : other slides in place of these, and how they are held
     """
     space, weights = scene.space, (factors / noise)[:, None, None]
     if motion is None:
         motion = space.factored(scene, space.matrix(scene, found.node * weights, stiffness)[0])
-    gauge = space.rows(scene).T @ gauge_of(scene, freedom)
+    still = still or Still(gauge_of(scene, freedom), slides, slides / scale[:, None] ** 2)
+    gauge = space.rows(scene).T @ still.gauge
     mixing, sigmas = freedom.spread(columns)
     cross = space.gathered(scene, found.cross * weights) @ mixing
     camera = mixing.T @ found.camera @ mixing / noise
     if shift is None:
-        return System(motion, cross, camera, gauge, 1 / sigmas**2, scale, slides, freedom.redundant, across=across)
+        return System(motion, cross, camera, gauge, 1 / sigmas**2, scale, still.slides, still.across, freedom.redundant)
     count = len(shift.scale)
     return System(
         motion,
@@ -132,8 +150,8 @@ def system_of(
         gauge,
         np.concatenate([1 / sigmas**2, np.ones(count)]),
         np.concatenate([scale, shift.scale]),
-        np.pad(slides, ((0, count), (0, 0))),
+        np.pad(still.slides, ((0, count), (0, 0))),
+        np.pad(still.across, ((0, count), (0, 0))),
         np.pad(freedom.redundant, ((0, count), (0, 0))),
         count,
-        None if across is None else np.pad(across, ((0, count), (0, 0))),
     )

@@ -10,7 +10,7 @@ from scipy import sparse
 
 from inspect3d.arrays import Floats, Integers
 from inspect3d.camera import View
-from inspect3d.correlation.bounded_step import bounded_step
+from inspect3d.correlation.bounded_step import bounded, bounded_step
 from inspect3d.correlation.conjugate import conjugate
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.linear import noise_of, robust, slides_of, system_of
@@ -20,7 +20,7 @@ from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.shift import Shift, needed_columns, shift_blocks, shift_of
 from inspect3d.correlation.space import Factored, Matrix
 from inspect3d.correlation.state import ON_NOMINAL, Level, State, Step
-from inspect3d.correlation.still import across_slides, stilled
+from inspect3d.correlation.still import slides_in_pictures, still_in_pictures, stilled
 from inspect3d.correlation.systematic import Systematic
 from inspect3d.outcome import MeasurementError
 from inspect3d.register.gauge import FREE
@@ -32,7 +32,7 @@ FINE, COARSE = 1e-5, 5e-4  # mm
 FINE_FEW, COARSE_FEW = 1e-4, 3e-3  # mm, for unknowns fewer than the nodes, whose steps shrink many times each
 SETTLED = 0.005  # share of what the cameras leave open about the shape: a shorter step changes nothing of note
 RUNAWAY = 0.3  # of the extent of what is seen: a step that large leads nowhere
-FARTHEST = 1.0  # px, or the blur: a step of the cameras before a shape that is held moves the pictures no farther
+FARTHEST = 1.0  # px, or the blur: a step of the cameras moves the pictures no farther, of shape and cameras apart
 MOST, MOST_PLAIN = 6, 30  # steps of conjugate gradients, with the factor of a similar matrix and with the diagonal
 
 
@@ -53,9 +53,10 @@ class Solver:
     ends : the last level is the end of the way; else it stops where the others do
 
     After four steps of a level, one that turns back is halved, and so are the next until they go on: where the
-    pictures show a motion weakly, a full step goes too far and the next comes back. The robust weights of the facets
-    settle in the first steps of a level and are then kept, lest they take turns. Blurred pictures show less, and are
-    compared at fewer points: one of 1 + 1.5 blur².
+    pictures show a motion weakly, a full step goes too far and the next comes back. A step after which the residuals
+    are larger is taken back and halved. The robust weights of the facets settle in the first steps of a level and then
+    only fall, lest they take turns: a facet over which the outline of the part has come counts no more as it did.
+    Blurred pictures show less, and are compared at fewer points: one of 1 + 1.5 blur².
     """
 
     levels: tuple[Level, ...]
@@ -101,7 +102,7 @@ class Solver:
         self, scene: Scene, stack: Stack, state: State, freedom: Freedom, number: int, told: Callable[[Step], None]
     ) -> State:
         level = self.levels[number]
-        if level.moves in ("shape", "poses"):
+        if level.moves in ("shape", "poses", "placed"):
             freedom = held(freedom, poses=level.moves == "shape")
         points = scene.points.thinned(1 + int(1.5 * level.blur**2)) if level.blur >= 1 else scene.points
         final = self.ends and number == len(self.levels) - 1
@@ -144,6 +145,8 @@ class Solver:
             else:
                 cameras, shift = np.zeros((2, 0))
                 shape, similar = _step_of_shape(scene, found, noise, state, level, similar)
+            if freedom.unknowns and level.moves not in ON_NOMINAL:
+                shape, cameras = bounded(scene, state, freedom, shape, cameras, max(level.blur, FARTHEST))
             change = max(
                 float(np.abs(rows @ shape)[~scene.slivers].max(initial=0.0)),
                 _reach(scene, cameras, freedom) if level.moves in ON_NOMINAL else 0,
@@ -158,7 +161,7 @@ class Solver:
                 )
             step = Step(level, change, float(np.sqrt(noise)))
             told(step)
-            weights = robust(found) if count < PATIENCE else state.weights
+            weights = robust(found) if count < PATIENCE else np.minimum(state.weights, robust(found))
             settled = change < max(tolerance, SETTLED * sure)
             state = replace(state, steps=(*state.steps, step), settled=settled, shift=shift)
             stride = _Stride(state, rows, shape, cameras, noise)
@@ -166,7 +169,7 @@ class Solver:
             if state.settled:
                 break
             last = shape
-            before = stride if freedom.unknowns and level.moves == "both" else None
+            before = stride if freedom.unknowns else None
         return state
 
 
@@ -227,13 +230,16 @@ def _step(
     if known is not None:
         blocks = shift_blocks(scene, found, columns, mixing, known, factors / noise, state.weights / noise)
         camera_right = np.concatenate([camera_right, blocks.right])
-    across = across_slides(scene, freedom, state.views, slides)
+    placing = freedom.poses == "free" or (freedom.poses == "common" and level.blur == 0)
+    still = slides_in_pictures(scene, freedom, state.views, slides)
+    if placing and still is None:
+        still = still_in_pictures(scene, freedom, state.views)
     system = system_of(
-        scene, found, factors, noise, freedom, columns, scale, slides, level.stiffness, blocks, across=across
+        scene, found, factors, noise, freedom, columns, scale, slides, level.stiffness, blocks, still=still
     )
     shape, together = system.solve(_equations(scene, found, noise, state, level)[1], camera_right)
     cameras, shift = np.split(together, [len(sigmas)])
-    if freedom.poses == "free" or (freedom.poses == "common" and level.blur == 0):
+    if placing and scene.space.confined:
         shape, cameras = stilled(scene, freedom, state.views, state.deviation, shape, cameras)
     by_cameras = (scene.space.rows(scene) @ system.following @ system.factor_by_cameras)[scene.whole]
     return shape, cameras, shift, float(np.sqrt((by_cameras**2).sum() / max(len(by_cameras), 1)))

@@ -10,7 +10,7 @@ import numpy as np
 from inspect3d.arrays import Floats
 from inspect3d.camera import View
 
-Moves = Literal["poses", "cameras", "shape", "both"]
+Moves = Literal["poses", "cameras", "shape", "placed", "both"]
 ON_NOMINAL = ("poses", "cameras")
 
 
@@ -24,7 +24,7 @@ class Level:
     stiffness : of the plate that smooths the shape, in median stiffnesses of a node; 0: none
     steps : at most
     moves : the cameras with the shape held (paper, eq. 4), or only their poses; the shape with the cameras held
-        (eq. 8); or both at once
+        (eq. 8), or with their lenses held only, "placed"; or both at once
     """
 
     blur: float

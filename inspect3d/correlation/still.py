@@ -9,7 +9,7 @@ import numpy as np
 from inspect3d.arrays import Floats, unit
 from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
-from inspect3d.correlation.linear import motions_of, moving_cameras
+from inspect3d.correlation.linear import Still, gauge_of, motions_of, moving_cameras
 from inspect3d.correlation.scene import SAMPLE, Scene
 from inspect3d.register.gauge import FREE
 
@@ -25,12 +25,10 @@ def stilled(
 ) -> tuple[Floats, Floats]:
     """Return a step of shape (k,) and cameras (m,) with a motion of the part added under which its surface keeps still.
 
-    Moving the part, and growing it where the scale is not known, together with all cameras changes nothing that the
-    pictures show. The gauge of the system takes the motion that leaves the shape none of its own, and so lets what the
-    pictures show weakly slide the surface through them by many pixels: over noise that is another every time, and over
-    the outline of the part. Here the motions that move the surface in itself mostly are chosen such that its points
-    stay where they are in the mean of the pictures, as far as they can and the scene's space has such motions. To tilt
-    a narrow plane moves its nodes little, and slides it less: no tilt keeps it still.
+    Of a space whose unknowns are fewer than the nodes, and does not have all motions of the part: `still_in_pictures`
+    says why. Motions that move the surface in itself mostly are chosen such that its points stay where they are in the
+    mean of the pictures, as far as they can and the space has such motions. To tilt a narrow plane moves its nodes
+    little, and slides it less: no tilt keeps it still.
 
     A space that has none holds such motions of the part by this, where they started. One that follows them but for a
     few per cent, as splines do on a smooth sheet, would take steps for ever that its gauge takes back: there the step
@@ -69,11 +67,35 @@ def stilled(
     return shape + fields @ sizes, cameras + changes @ sizes
 
 
-def across_slides(scene: Scene, freedom: Freedom, views: Sequence[View], slides: Floats) -> Floats | None:
-    """Return N (m, s), with N'p = 0 where cameras do not slide the surface along slides in the mean of the pictures.
+def still_in_pictures(scene: Scene, freedom: Freedom, views: Sequence[View]) -> Still | None:
+    """Return how the surface keeps still in the mean of the pictures while shape and cameras are solved for.
+
+    Moving the part, and growing it where the scale is not known, together with all cameras changes nothing that the
+    pictures show. A gauge that leaves the shape no such motion would let what the pictures show weakly slide the
+    surface through them by many pixels: over noise that is another every time, and over the outline of the part. So
+    motions that mostly move the surface in itself are left to the shape, and the cameras keep the pictures of the part
+    where they are in the mean. To tilt a narrow plane moves its nodes little, and slides it less: that stays with the
+    gauge. None where no motion is one of these, and for spaces that cannot follow them all, see `stilled`.
+    """
+    left, values, right = motions_of(scene, freedom)
+    soft = values**2 <= SOFT * values[0] ** 2
+    if scene.space.confined or not soft.any():
+        return None
+    scale = freedom.scale(views, scene.sample)
+    flow = _flow(freedom, views, scene.sample, np.diag(scale)) / scale
+    changes = moving_cameras(scene, freedom, views, right[soft])
+    _, sizes, turns = np.linalg.svd(flow @ changes, full_matrices=False)
+    sliding = sizes > SLIDING * sizes[0]
+    gauge = np.column_stack([left[:, ~soft], (left * values)[:, soft] @ turns[~sliding].T])
+    slides = changes @ turns[sliding].T
+    return Still(gauge, slides, flow.T @ (flow @ slides))
+
+
+def slides_in_pictures(scene: Scene, freedom: Freedom, views: Sequence[View], slides: Floats) -> Still | None:
+    """Return how cameras are held where they slide the surface along slides in the mean of the pictures.
 
     Changes of the lenses slide it as well: with the poses held along the slides themselves, splines on a sheet slid by
-    13 px. None where nodes move by themselves, which `stilled` keeps still, or nothing slides.
+    13 px. None where nodes move by themselves, see `still_in_pictures`, or nothing slides.
 
     Parameters
     ----------
@@ -83,7 +105,7 @@ def across_slides(scene: Scene, freedom: Freedom, views: Sequence[View], slides:
         return None
     scale = freedom.scale(views, scene.sample)
     flow = _flow(freedom, views, scene.sample, np.diag(scale)) / scale
-    return np.asarray(flow.T @ (flow @ slides))
+    return Still(gauge_of(scene, freedom), slides, flow.T @ (flow @ slides))
 
 
 def left_open(scene: Scene, freedom: Freedom, views: Sequence[View]) -> Floats:

@@ -30,10 +30,10 @@ class System:
     gauge : C (n, g), independent columns, which may be none
     prior : (m,) the diagonal of P
     scale : (m,) the units of the unknowns p in which their stiffnesses compare
-    slides : (m, s) changes of the cameras that no picture shows, held
+    slides : (m, s) changes of the cameras that no picture shows
+    across : N (m, s), by which they are held, N'p = 0
     redundant : (m, r) changes of the cameras that others stand for, held
     shifts : how many of the m unknowns, the last ones, are numbers of a smooth shift of the pictures
-    across : N (m, s), by which the slides are held, N'p = 0; none: by the slides themselves, in the units of `scale`
     """
 
     motion: Factored
@@ -43,9 +43,9 @@ class System:
     prior: Floats
     scale: Floats
     slides: Floats
+    across: Floats
     redundant: Floats
     shifts: int = 0
-    across: Floats | None = None
 
     @cached_property
     def held(self) -> tuple[Floats, Floats]:
@@ -80,11 +80,9 @@ class System:
         if not len(self.scale):
             return np.zeros((0, 0)), np.zeros((0, 0))
         both = self.scale * self.scale[:, None]
-        slides = self.slides / self.scale[:, None]
-        across = slides if self.across is None else self.across * self.scale[:, None]
-        held = np.column_stack([across, self.redundant / self.scale[:, None]])
-        others = np.linalg.qr(held, mode="complete")[0][:, held.shape[1] :]
-        slides = np.linalg.qr(slides)[0]
+        held = np.column_stack([self.across * self.scale[:, None], self.redundant / self.scale[:, None]])
+        turned, _ = np.linalg.qr(held, mode="complete")
+        slides, others = np.linalg.qr(self.slides / self.scale[:, None])[0], turned[:, held.shape[1] :]
         values, modes = np.linalg.eigh(others.T @ (self.reduced * both) @ others)
         modes = others @ modes
         silent = values <= NOTHING * float(np.linalg.eigvalsh(self.camera * both)[-1])

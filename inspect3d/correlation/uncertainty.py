@@ -21,7 +21,7 @@ from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.shift import needed_columns, shift_blocks, shift_of, without_shift
 from inspect3d.correlation.smoothing import Smoothing
 from inspect3d.correlation.solver import held
-from inspect3d.correlation.still import across_slides, left_open
+from inspect3d.correlation.still import left_open, slides_in_pictures
 from inspect3d.correlation.system import System
 from inspect3d.correlation.systematic import Systematic
 
@@ -155,10 +155,8 @@ def uncertainty(
     if known is not None and freedom.unknowns:
         blocks = shift_blocks(scene, found, columns, mixing, known, factors / total, weights / total)
     motion_factor = None if scene.space.confined else first.motion.times(before / total)
-    across = across_slides(scene, freedom, views, slides)
-    system = system_of(
-        scene, found, factors, total, freedom, columns, scale, slides, 0.0, blocks, motion_factor, across
-    )
+    kept = slides_in_pictures(scene, freedom, views, slides)
+    system = system_of(scene, found, factors, total, freedom, columns, scale, slides, 0.0, blocks, motion_factor, kept)
     rough, model = np.zeros(len(scene.nodes)), None
     if scene.space.confined:
         model = model_error(scene, found, views, weights, still, columns, lack, summed, total, motion, system.motion)
