@@ -16,13 +16,13 @@ from click_free_scenes import RandomScene, nominal
 
 from inspect3d.arrays import Floats
 from inspect3d.camera import View
-from inspect3d.correlation.correlate import SHAPE
 from inspect3d.correlation.freedom import Freedom
 from inspect3d.correlation.linear import gauge_of, motions_of, moving_cameras
 from inspect3d.correlation.seen import scene as scene_of
 from inspect3d.correlation.shape import Shape
 from inspect3d.correlation.start import Begin
 from inspect3d.correlation.stereo import PickedPoint, Stereo
+from inspect3d.correlation.ways import SHAPE
 from inspect3d.files.photograph import Photograph
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError

@@ -21,10 +21,11 @@ import numpy as np
 from stereo_trial import CASES, Setup, Trial, error_of, modes_of, remover, rms
 
 from inspect3d.arrays import Booleans, Floats
-from inspect3d.correlation.correlate import TWO_STEPS, Correlate
+from inspect3d.correlation.correlate import Correlate
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.picks import Picks, ideal_camera, placed_by_picks
 from inspect3d.correlation.shape import Shape
+from inspect3d.correlation.ways import TWO_STEPS
 from inspect3d.virtual.milled import MilledSizes
 from inspect3d.virtual.picks import picks
 from inspect3d.virtual.scene import Scene

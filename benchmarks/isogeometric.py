@@ -28,11 +28,13 @@ from spline_field import SplineField
 from stereo_trial import CASES, Setup, Trial, cover, error_of, modes_of, remover, rms
 
 from inspect3d.arrays import Booleans, Floats
-from inspect3d.correlation.correlate import SHAPE, Correlate, Level
+from inspect3d.correlation.correlate import Correlate
 from inspect3d.correlation.picture import Pictures
 from inspect3d.correlation.residual import residuals
 from inspect3d.correlation.shape import Shape
 from inspect3d.correlation.splines import Splines
+from inspect3d.correlation.state import Level
+from inspect3d.correlation.ways import SHAPE
 from inspect3d.nominal.nurbs import Nurbs
 from inspect3d.nominal.nurbs_face import nurbs_of
 from inspect3d.nominal.step_iges import read_brep

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from inspect3d.camera import View
-from inspect3d.correlation.correlate import JOINT, SHAPE, TWO_STEPS, Correlate
+from inspect3d.correlation.correlate import Correlate
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.systematic import Systematic
+from inspect3d.correlation.ways import JOINT, SHAPE, TWO_STEPS
 from inspect3d.outcome import MeasurementError
 from inspect3d.pose import Pose
 from tests.sheets import plane, plane_normals, sheet

@@ -27,26 +27,10 @@ from inspect3d.correlation.still import SOFT, in_gauge, slid
 from inspect3d.correlation.systematic import Systematic
 from inspect3d.correlation.texture import speckle_size
 from inspect3d.correlation.uncertainty import Uncertainty, uncertainty
+from inspect3d.correlation.ways import JOINT, PLACED, SHAPE, SPLINES
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
 from inspect3d.register.gauge import FREE
-
-SHAPE = (Level(6, 1000, 8, "shape"), Level(3, 100, 8, "shape"), Level(1.5, 1, 8, "shape"), Level(0, 0, 20, "shape"))
-POSES = (Level(6, 0, 15, "poses"), Level(3, 0, 15, "poses"))
-JOINT = (*POSES, Level(6, 100, 8), Level(3, 1, 8), Level(1.5, 0.1, 8), Level(0, 0, 40))
-PLACED = (*POSES, Level(6, 100, 8, "placed"), Level(3, 1, 8, "placed"), Level(1.5, 0.1, 8, "placed"), JOINT[-1])
-TWO_STEPS = (*POSES, *(Level(blur, 0, 20, "cameras") for blur in (3.0, 1.5, 0.0)), *SHAPE)
-SPLINES = (SHAPE[0], SHAPE[1], SHAPE[3])
-"""Ways from coarse to fine: shape alone; cameras and shape together, of a calibrated rig and of cameras with poses of
-their own; the paper's two steps; and splines alone.
-
-Of cameras and shape together only the poses are brought near the nominal shape first: lenses that take its true
-deviations for errors of their own would run far off their priors. So would those of cameras with poses of their own,
-which are less well known, where blur and plate are wrong in ways that they can follow: they wait for the sharp
-pictures. Poses that are free run off as well, along the surface, by what is wrong with their lenses: such slides are
-held, where the start has them. Before a known rig the nominal shape tells where along itself the part lies; where that
-runs off, as of nearly a plane, slides are held too.
-"""
 
 NOISY = 25.0
 STEEPEST_TILT = 0.2
@@ -139,7 +123,8 @@ class Correlate:
         _require_coarse(seen, pictures, views)
         known = Freedom("known", tuple(Lens() for _ in views), tuple(views), seen.centre)
         freedom = freedom or known
-        alone, joint = SHAPE if self.splines is None else SPLINES, PLACED if freedom.poses == "free" else JOINT
+        alone, joint = (SHAPE, PLACED) if self.splines is None else (SPLINES, JOINT)
+        joint = joint if freedom.poses == "free" else JOINT
         levels = self.levels or (joint if freedom.unknowns else alone)
         coarse = levels[:-1]
         calibrating = tuple(takewhile(lambda level: level.moves in ON_NOMINAL, coarse))

@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from inspect3d.arrays import Booleans
-from inspect3d.correlation.correlate import TWO_STEPS, Correlate
+from inspect3d.correlation.correlate import Correlate
 from inspect3d.correlation.illustrated import MOVES, illustrated
 from inspect3d.correlation.picks import FEWEST, Picks
 from inspect3d.correlation.picture import Interpolation
 from inspect3d.correlation.start import StereoStart
 from inspect3d.correlation.state import Step
 from inspect3d.correlation.systematic import Systematic
+from inspect3d.correlation.ways import TWO_STEPS
 from inspect3d.correlation.words import contributions, remarks
 from inspect3d.files.calibration import Rig, what_is_known
 from inspect3d.files.calibration_load import load_calibration
