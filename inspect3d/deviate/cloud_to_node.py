@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inspect3d.arrays import Booleans, Floats
+from inspect3d.deviate.lack_of_fit import lack_of_fit
 from inspect3d.nominal.nominal import InspectionMesh
 from inspect3d.nominal.surface import Feet
 
@@ -22,6 +23,8 @@ class NodeFit:
     observed : (n,)
     noise : mm, standard uncertainty of a point: as given, or the robust scatter of the points about the local fits
     radius : mm, of the fits
+    missed : (n,) mm², variance of what the polynomial does not follow, which the scatter does not show; 0 where it is
+        not told, NaN where not observed
     """
 
     value: Floats
@@ -29,6 +32,7 @@ class NodeFit:
     observed: Booleans
     noise: float
     radius: float
+    missed: Floats
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,9 @@ class CloudToNode:
     Points that are less certain count less. The variance is s² times the first entry of (A'A)⁻¹, with s² pooled from
     the node's own scatter and the noise of the cloud, which counts as `prior` further points. A node that lies beyond
     the edge of the scan is not observed: an extrapolated value is not a measured one.
+
+    What the quadratic polynomial does not follow, as narrow ridges, hardly shows in the scatter. By how much r⁴, as one
+    more term, would change the value at the nodes tells the variance of it (`lack_of_fit`), which is kept apart.
 
     Parameters
     ----------
@@ -77,7 +84,7 @@ class CloudToNode:
         chosen = np.flatnonzero(part & ~feet.on_rim)
         if not len(chosen):
             nothing = np.full(len(mesh), np.nan)
-            return NodeFit(nothing, nothing, np.zeros(len(mesh), bool), noise or np.nan, np.nan)
+            return NodeFit(nothing, nothing, np.zeros(len(mesh), bool), noise or np.nan, np.nan, nothing)
         edge = mesh.edge_length
         cell = edge / 2
         low = feet.points[chosen].min(axis=0)
@@ -89,14 +96,19 @@ class CloudToNode:
         weights = np.ones(len(chosen)) if shares is None else 1 / shares[chosen]
         grid = (low, cell, shape, keys, feet.points[chosen], feet.normals[chosen], feet.distance[chosen], weights)
         radii = self._radii(mesh, keys, cell)
-        value, factor, squares, freedom = fit_nodes(mesh.nodes, mesh.normals, radii, noise or 0.0, *grid)
+        value, factor, squares, freedom, change, uncertain = fit_nodes(
+            mesh.nodes, mesh.normals, radii, noise or 0.0, *grid
+        )
         observed = np.isfinite(factor) & ~mesh.crease
         usual = _pooled(squares[observed], freedom[observed])
         noise = noise or usual
         observed &= squares <= (self.unlike * max(noise, usual)) ** 2 * np.maximum(freedom, 1)
         pooled = (self.prior * noise**2 + squares) / (self.prior + freedom)
         variance = np.where(observed, pooled * np.where(observed, factor, 1.0), np.nan)
-        return NodeFit(np.where(observed, value, np.nan), variance, observed, noise, float(radii[0, 0]))
+        told = observed & np.isfinite(uncertain)
+        missed = np.where(observed, 0.0, np.nan)
+        missed[told] = lack_of_fit(mesh, told, change[told], pooled[told] * uncertain[told], variance[told])
+        return NodeFit(np.where(observed, value, np.nan), variance, observed, noise, float(radii[0, 0]), missed)
 
     def _radii(self, mesh: InspectionMesh, keys: np.ndarray, cell: float) -> Floats:
         """Return the radii to try at each node, (n, 3) mm, from the density of the points."""

@@ -183,6 +183,7 @@ class Deviate:
             observed=observed,
             value=np.where(hidden, np.nan, fit.value),
             variance=np.where(hidden, np.nan, fit.variance),
+            missed=np.where(hidden, np.nan, fit.missed),
         )
 
     def _map(
@@ -271,10 +272,14 @@ def _shares(clouds: tuple[Cloud, ...]) -> Floats | None:
 
 
 def _own(fit: NodeFit, mesh: InspectionMesh, alike: float) -> FieldCovariance:
-    """Return the covariance of the local fits, their noise `alike` over so many mm."""
+    """Return the covariance of the local fits, their noise `alike` over so many mm.
+
+    What the fits miss is added as independent between nodes. Shared noise bends the fits as a missed shape does and
+    is in the covariance already, so that where it is stated nothing is added.
+    """
     seen = np.flatnonzero(fit.observed)
     if not alike:
-        return Independent(fit.variance[seen])
+        return Independent(fit.variance[seen] + fit.missed[seen])
     return with_alike_noise(fit.variance[seen], mesh.nodes[seen], fit.noise, alike, fit.radius)
 
 

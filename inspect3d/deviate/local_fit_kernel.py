@@ -113,10 +113,46 @@ def _solve(columns: Floats, y: Floats, kept: Booleans, unknowns: int, matrix: Fl
 
 
 @njit(cache=True)
-def _fit(columns: Floats, y: Floats, plain: Floats, noise: float, unknowns: int) -> tuple[float, float, float, int]:
-    """Return value at the node, variance factor, sum of squared residuals, points kept; factor inf: no fit.
+def _change(
+    columns: Floats, fourth: Floats, residual: Floats, kept: Booleans, unknowns: int, matrix: Floats
+) -> tuple[float, float]:
+    """Return by how much one more column changes the value at the node, and the variance factor of that; inf: none.
 
-    Rows and right-hand side are weighted; `plain` is the latter without.
+    With the column q beside the fitted A, the residuals r, M = A'A (`matrix` holds its Cholesky factor) and
+    b = A'q: s = q'q - b'M⁻¹b; its coefficient is q'r / s, the change -(M⁻¹b)₀ q'r / s and its factor (M⁻¹b)₀² / s.
+    """
+    solved = np.zeros(unknowns)
+    own = along = 0.0
+    for p in range(len(fourth)):
+        if not kept[p]:
+            continue
+        own += fourth[p] * fourth[p]
+        along += fourth[p] * residual[p]
+        for a in range(unknowns):
+            solved[a] += columns[p, a] * fourth[p]
+    left = own
+    for i in range(unknowns):
+        for k in range(i):
+            solved[i] -= matrix[i, k] * solved[k]
+        solved[i] /= matrix[i, i]
+        left -= solved[i] * solved[i]
+    if left < 1e-6 * own or not own > 0.0:
+        return 0.0, math.inf
+    for i in range(unknowns - 1, -1, -1):
+        for k in range(i + 1, unknowns):
+            solved[i] -= matrix[k, i] * solved[k]
+        solved[i] /= matrix[i, i]
+    return -solved[0] * along / left, solved[0] ** 2 / left
+
+
+@njit(cache=True)
+def _fit(
+    columns: Floats, fourth: Floats, y: Floats, plain: Floats, noise: float, unknowns: int
+) -> tuple[float, float, float, int, float, float]:
+    """Return value at the node, variance factor, sum of squared residuals, degrees of freedom; factor inf: no fit.
+
+    The last two are the change of the value by the `fourth` power of the distance and its variance factor. Rows and
+    right-hand side are weighted; `plain` is the latter without.
     """
     n = len(y)
     middle = np.median(plain)
@@ -128,7 +164,7 @@ def _fit(columns: Floats, y: Floats, plain: Floats, noise: float, unknowns: int)
     for order in (LINEAR, unknowns, unknowns, unknowns, unknowns, unknowns, unknowns, unknowns):
         factor = _solve(columns, y, kept, order, matrix, coefficients)
         if not factor < math.inf:
-            return 0.0, math.inf, 0.0, 0
+            return 0.0, math.inf, 0.0, 0, 0.0, math.inf
         for p in range(n):
             residual[p] = y[p]
             for a in range(order):
@@ -146,8 +182,11 @@ def _fit(columns: Floats, y: Floats, plain: Floats, noise: float, unknowns: int)
         if order == unknowns and not changed:
             break
     if count <= unknowns + 2 or 2 * count < n:
-        return 0.0, math.inf, 0.0, 0
-    return coefficients[0], factor, squares, count - unknowns
+        return 0.0, math.inf, 0.0, 0, 0.0, math.inf
+    change, uncertain = 0.0, math.inf
+    if unknowns == QUADRATIC and not changed and count >= ENOUGH:
+        change, uncertain = _change(columns, fourth, residual, kept, unknowns, matrix)
+    return coefficients[0], factor, squares, count - unknowns, change, uncertain
 
 
 @njit(parallel=True, cache=True)
@@ -164,8 +203,8 @@ def fit_nodes(
     foot_normals: Floats,
     distance: Floats,
     weights: Floats,
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return value (mm), variance factor, residual sum of squares (mm²) and degrees of freedom for each node.
+) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
+    """Return value (mm), variance factor, residual sum of squares (mm²), degrees of freedom and change for each node.
 
     Parameters
     ----------
@@ -178,11 +217,14 @@ def fit_nodes(
 
     Returns
     -------
-    value (n,), factor (n,) with inf where the node is not observed, squares (n,), freedom (n,)
+    value (n,), factor (n,) with inf where the node is not observed, squares (n,), freedom (n,), and by how much the
+    fourth power of the distance from the node, as one more term of a quadratic fit, changes the value (n,) mm, with
+    the variance factor of that (n,), inf where it is not told
     """
     n = len(nodes)
     value, factor = np.zeros(n), np.full(n, math.inf)
     squares, freedom = np.zeros(n), np.zeros(n)
+    change, uncertain = np.zeros(n), np.full(n, math.inf)
     for i in prange(n):
         found = np.empty(MOST, np.int64)
         normal = normals[i]
@@ -198,7 +240,8 @@ def fit_nodes(
                 break
         if count < LEAST:
             continue
-        columns, y, plain = np.empty((count, 6)), np.empty(count), np.empty(count)
+        columns, fourth = np.empty((count, 6)), np.empty(count)
+        y, plain = np.empty(count), np.empty(count)
         certain, east, north = 0.0, 0.0, 0.0
         for c in range(count):
             p = found[c]
@@ -209,14 +252,19 @@ def fit_nodes(
             w = weights[p]
             columns[c, 0], columns[c, 1], columns[c, 2] = w, w * u, w * v
             columns[c, 3], columns[c, 4], columns[c, 5] = w * u * u, w * u * v, w * v * v
+            fourth[c] = w * (u * u + v * v) ** 2
             y[c], plain[c] = w * distance[p], distance[p]
             certain, east, north = certain + w * w / count, east + u / count, north + v / count
         if math.hypot(east, north) > AMIDST:
             continue
         if count >= ENOUGH:
-            value[i], factor[i], squares[i], freedom[i] = _fit(columns, y, plain, noise, QUADRATIC)
+            value[i], factor[i], squares[i], freedom[i], change[i], uncertain[i] = _fit(
+                columns, fourth, y, plain, noise, QUADRATIC
+            )
         if not factor[i] * certain <= 1.0:
-            value[i], factor[i], squares[i], freedom[i] = _fit(columns, y, plain, noise, LINEAR)
+            value[i], factor[i], squares[i], freedom[i], change[i], uncertain[i] = _fit(
+                columns, fourth, y, plain, noise, LINEAR
+            )
         if not factor[i] * certain <= 1.0:
             factor[i] = math.inf
-    return value, factor, squares, freedom
+    return value, factor, squares, freedom, change, uncertain
