@@ -81,8 +81,7 @@ def still_in_pictures(scene: Scene, freedom: Freedom, views: Sequence[View]) -> 
     soft = values**2 <= SOFT * values[0] ** 2
     if scene.space.confined or not soft.any():
         return None
-    scale = freedom.scale(views, scene.sample)
-    flow = _flow(freedom, views, scene.sample, np.diag(scale)) / scale
+    flow = _flow_of_unknowns(freedom, views, scene.sample)
     changes = moving_cameras(scene, freedom, views, right[soft])
     _, sizes, turns = np.linalg.svd(flow @ changes, full_matrices=False)
     sliding = sizes > SLIDING * sizes[0]
@@ -103,8 +102,7 @@ def slides_in_pictures(scene: Scene, freedom: Freedom, views: Sequence[View], sl
     """
     if not (scene.space.confined and freedom.poses == "free" and slides.shape[1]):
         return None
-    scale = freedom.scale(views, scene.sample)
-    flow = _flow(freedom, views, scene.sample, np.diag(scale)) / scale
+    flow = _flow_of_unknowns(freedom, views, scene.sample)
     return Still(gauge_of(scene, freedom), slides, flow.T @ (flow @ slides))
 
 
@@ -124,6 +122,12 @@ def left_open(scene: Scene, freedom: Freedom, views: Sequence[View]) -> Floats:
     flow = _flow(freedom, views, scene.sample, moving_cameras(scene, freedom, views, right[held]))
     sizes = STARTED / np.sqrt(2 * np.mean(flow**2, axis=0))
     return scene.space.motion(scene, left[:, held] * values[held] * sizes)
+
+
+def _flow_of_unknowns(freedom: Freedom, views: Sequence[View], points: Floats) -> Floats:
+    """Return how the unknowns of the cameras move points (p, 3) in the mean of the pictures, (2 p, m) px."""
+    scale = freedom.scale(views, points)
+    return _flow(freedom, views, points, np.diag(scale)) / scale
 
 
 def _flow(freedom: Freedom, views: Sequence[View], points: Floats, changes: Floats) -> Floats:
