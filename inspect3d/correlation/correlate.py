@@ -31,6 +31,7 @@ from inspect3d.correlation.ways import JOINT, PLACED, SHAPE, SPLINES
 from inspect3d.nominal.nominal import Nominal
 from inspect3d.outcome import MeasurementError
 from inspect3d.register.gauge import FREE
+from inspect3d.threads import blas_of_one_thread
 
 NOISY = 25.0
 STEEPEST_TILT = 0.2
@@ -91,6 +92,7 @@ class Correlate:
     smoothing: float = 0.0
     splines: Splines | None = None
 
+    @blas_of_one_thread
     def __call__(
         self,
         nominal: Nominal,

@@ -11,7 +11,7 @@ from scipy import sparse
 from inspect3d.arrays import Booleans, Floats, Integers, unit
 from inspect3d.correlation.evaluation import EvaluationPoints
 from inspect3d.correlation.factor import Ordering
-from inspect3d.correlation.space import EVERY_NODE, Space
+from inspect3d.correlation.space import EVERY_NODE, Space, congruent, packed
 from inspect3d.nominal.remeshing import FEATURE_ANGLE
 
 WHOLE = 0.5
@@ -169,8 +169,7 @@ class Scene:
     @cached_property
     def plate_of_motions(self) -> Floats:
         """Return B'RB (k, k), the plate under the motions of the space, in full."""
-        rows = self.space.rows(self)
-        return np.asarray((rows.T @ (self.matrix(self.plate) @ rows)).toarray())
+        return congruent(self.matrix(self.plate), packed(self.space.rows(self)))
 
     def matrix(self, values: Floats) -> sparse.csr_matrix:
         """Return a matrix (n, n) with these values in the pattern."""

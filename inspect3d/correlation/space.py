@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from inspect3d.nominal.nurbs import Nurbs
 
 SUPPORT = 1e-6
+FILLED = 0.05  # share of entries that are not zero
 RIDGE = 1e-9
 Matrix: TypeAlias = sparse.csr_matrix | Floats
 
@@ -165,3 +166,18 @@ def typical(diagonal: Floats) -> float:
     """Return the median stiffness of the nodes that show texture, from the diagonal (n,) of a nodal matrix."""
     stiff_ones = diagonal[diagonal > 0]
     return float(np.median(stiff_ones)) if len(stiff_ones) else 1.0
+
+
+def packed(matrix: sparse.csr_matrix) -> Matrix:
+    """Return a matrix, in full where that is quicker to multiply."""
+    return matrix.toarray() if matrix.nnz > FILLED * np.prod(matrix.shape) else matrix
+
+
+def in_full(matrix: Matrix) -> Floats:
+    """Return a matrix with its zeros."""
+    return matrix if isinstance(matrix, np.ndarray) else np.asarray(matrix.toarray())
+
+
+def congruent(matrix: sparse.csr_matrix, rows: Matrix) -> Floats:
+    """Return R'MR in full."""
+    return in_full(rows.T @ (matrix @ rows))

@@ -11,14 +11,13 @@ from scipy import sparse
 
 from inspect3d.arrays import Booleans, Floats, Integers
 from inspect3d.correlation.dense import DenseFactor, cholesky
-from inspect3d.correlation.space import RIDGE, Factored, Matrix, typical
+from inspect3d.correlation.space import RIDGE, Factored, Matrix, congruent, in_full, packed, typical
 
 if TYPE_CHECKING:
     from inspect3d.correlation.evaluation import EvaluationPoints
     from inspect3d.correlation.scene import Scene
     from inspect3d.nominal.nurbs import Nurbs
 
-FILLED = 0.05  # share of entries that are not zero
 SOFT = 1e-2  # medians of the stiffness of a node; it flattens a bump of four elements by less than a hundredth
 SAMPLES = 4
 """Parts into which the edges of a facet are cut; the centres of what they cut it into are its sample points."""
@@ -80,19 +79,19 @@ class SplineSpace:
     def gathered(self, scene: Scene, parts: Floats) -> Floats:
         """Return what the corners give the control points."""
         flat = parts.reshape(3 * len(parts), int(np.prod(parts.shape[2:])))
-        summed = self._corners.T @ flat
+        summed = self._packed.T @ flat
         summed = summed if self.free is None else self.free.T @ summed
         return summed.reshape(len(summed), *parts.shape[2:])
 
     def at_corners(self, scene: Scene, motions: Floats) -> Floats:
         """Return the corners of the planes that fit best."""
-        return (self._corners @ self._spread(motions)).reshape(len(scene.triangles), 3, *motions.shape[1:])
+        return (self._packed @ self._spread(motions)).reshape(len(scene.triangles), 3, *motions.shape[1:])
 
     def matrix(self, scene: Scene, blocks: Floats, stiffness: float) -> tuple[Matrix, Matrix]:
         """Return full matrices; a soft plate always stays, for control points that hardly anything shows."""
         median = typical(scene.gathered(np.einsum("fii->fi", blocks)))
         plate = median * (max(stiffness, SOFT) * scene.plate_of_motions + RIDGE * self._square)
-        found = _congruent(_in_blocks(blocks), self._packed)
+        found = congruent(_in_blocks(blocks), self._packed)
         found = found if self.free is None else self.free.T @ found @ self.free
         return found + plate, plate
 
@@ -105,8 +104,8 @@ class SplineSpace:
         """
         corners, every = scene.triangles.ravel(), np.arange(3 * len(blocks))
         gather = sparse.csr_matrix((np.ones(len(every)), (corners, every)), shape=(len(scene.nodes), len(every)))
-        of_points = gather @ (_in_blocks(blocks) @ self._corners)
-        return np.asarray(of_points.toarray() if self.free is None else of_points @ self.free)
+        of_points = in_full(gather @ (_in_blocks(blocks) @ self._packed))
+        return of_points if self.free is None else of_points @ self.free
 
     def factored(self, scene: Scene, matrix: Matrix) -> DenseFactor:
         """Return the full factor."""
@@ -171,25 +170,19 @@ class SplineSpace:
     @cached_property
     def _packed(self) -> Matrix:
         """Return the corners of the planes, in full where that is quicker to multiply."""
-        corners = self._corners
-        return corners.toarray() if corners.nnz > FILLED * np.prod(corners.shape) else corners
+        return packed(self._corners)
 
     @cached_property
     def _square(self) -> Floats:
         """Return B'B."""
-        return np.asarray((self._rows.T @ self._rows).toarray())
+        rows = packed(self._rows)
+        return in_full(rows.T @ rows)
 
 
 def _in_blocks(blocks: Floats) -> sparse.bsr_matrix:
     """Return a matrix of blocks (f, 3, 3) along its diagonal."""
     f = len(blocks)
     return sparse.bsr_matrix((blocks, np.arange(f), np.arange(f + 1)), shape=(3 * f, 3 * f))
-
-
-def _congruent(matrix: sparse.csr_matrix, rows: Matrix) -> Floats:
-    """Return R'MR in full."""
-    product = rows.T @ (matrix @ rows)
-    return np.asarray(product.toarray() if sparse.issparse(product) else product)
 
 
 def sample_points() -> Floats:
