@@ -26,6 +26,7 @@ PIPELINE = (
         "readable",
         "file_name",
         "figure",
+        "threads",
     },
     {"files"},
     {"nominal"},

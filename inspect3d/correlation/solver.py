@@ -20,7 +20,7 @@ from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.shift import Shift, needed_columns, shift_blocks, shift_of
 from inspect3d.correlation.space import Factored, Matrix
 from inspect3d.correlation.state import ON_NOMINAL, Level, State, Step
-from inspect3d.correlation.still import slides_in_pictures, still_in_pictures, stilled
+from inspect3d.correlation.still import across_in_pictures, slides_in_pictures, still_in_pictures, stilled
 from inspect3d.correlation.systematic import Systematic
 from inspect3d.outcome import MeasurementError
 from inspect3d.register.gauge import FREE
@@ -221,7 +221,8 @@ def _step(
     camera_right = mixing.T @ found.camera_right / noise - freedom.offset(state.views) / sigmas**2
     if level.moves in ON_NOMINAL:
         matrix = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)
-        firm = np.linalg.svd(slides / scale[:, None])[0][:, slides.shape[1] :] * scale[:, None]
+        across = across_in_pictures(scene, freedom, state.views, slides)
+        firm = np.linalg.svd(across * scale[:, None])[0][:, slides.shape[1] :] * scale[:, None]
         cameras = bounded_step(
             scene, state.views, freedom, firm, firm.T @ matrix @ firm, camera_right, max(level.blur, FARTHEST)
         )

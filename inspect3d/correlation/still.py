@@ -87,7 +87,7 @@ def still_in_pictures(scene: Scene, freedom: Freedom, views: Sequence[View]) -> 
     sliding = sizes > SLIDING * sizes[0]
     gauge = np.column_stack([left[:, ~soft], (left * values)[:, soft] @ turns[~sliding].T])
     slides = changes @ turns[sliding].T
-    return Still(gauge, slides, flow.T @ (flow @ slides))
+    return Still(gauge, slides, across_in_pictures(scene, freedom, views, slides))
 
 
 def slides_in_pictures(scene: Scene, freedom: Freedom, views: Sequence[View], slides: Floats) -> Still | None:
@@ -102,8 +102,20 @@ def slides_in_pictures(scene: Scene, freedom: Freedom, views: Sequence[View], sl
     """
     if not (scene.space.confined and freedom.poses == "free" and slides.shape[1]):
         return None
+    return Still(gauge_of(scene, freedom), slides, across_in_pictures(scene, freedom, views, slides))
+
+
+def across_in_pictures(scene: Scene, freedom: Freedom, views: Sequence[View], slides: Floats) -> Floats:
+    """Return N (m, s) by which cameras that do not slide the surface in the mean of the pictures have N'p = 0.
+
+    To hold them along the slides alone would not do: turns and shifts of each camera make much the same of a slide.
+
+    Parameters
+    ----------
+    slides : (m, s), see `slides_of`
+    """
     flow = _flow_of_unknowns(freedom, views, scene.sample)
-    return Still(gauge_of(scene, freedom), slides, flow.T @ (flow @ slides))
+    return flow.T @ (flow @ slides)
 
 
 def left_open(scene: Scene, freedom: Freedom, views: Sequence[View]) -> Floats:
