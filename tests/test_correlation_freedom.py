@@ -121,6 +121,23 @@ def test_slides_that_are_held_stay_where_they_started(wavy):
     assert slid(seen, off, stays) < 0.1 * slid(seen, views, off)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_poses_come_home_without_a_slide_in_the_mean_of_the_pictures(wavy, seed):
+    _, views, seen, _ = wavy
+    free = Freedom("free", (Lens(),) * 2, tuple(views), seen.centre)
+    _, values, right = motions_of(seen, free)
+    soft = moving_cameras(seen, free, views, right[values**2 <= SOFT * values[0] ** 2])
+    away = 0.5 * free.scale(views, seen.sample) * np.random.default_rng(seed).normal(size=free.unknowns)
+    off = free.moved(views, away)
+    level = solver.Level(3, 0, 8, "poses")
+    found = solver.Solver((level,), slides=SOFT)(seen, photographed_wave(views), off, free).views
+    start = mean_place(off, seen.sample)
+    ways = np.stack([mean_place(free.moved(off, 1e-3 * way), seen.sample) - start for way in soft.T], axis=1)
+    moved = mean_place(found, seen.sample) - start
+    slid_by = ways @ np.linalg.lstsq(ways, moved, rcond=None)[0]
+    assert np.linalg.norm(slid_by) < 0.15 * np.linalg.norm(moved)
+
+
 def test_a_stilled_step_slides_no_more_than_it_must_and_shows_the_same_disparities(wavy):
     _, views, seen, _ = wavy
     free = Freedom("free", (Lens(30.0, 10.0),) * 2, views, seen.centre)
@@ -346,3 +363,8 @@ def test_a_view_that_moves_sees_what_a_part_that_moves_shows():
     points = np.random.default_rng(0).uniform(0, 40, (5, 3))
     moved = View(views[0].camera, views[0].camera_from_cad @ motion)
     assert moved.project(points) == pytest.approx(views[0].project(motion(points)))
+
+
+def mean_place(views, points):
+    """Return where the views see points, in the mean, all in one row."""
+    return np.mean([view.project(points) for view in views], axis=0).ravel()
