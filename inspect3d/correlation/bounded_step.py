@@ -11,7 +11,9 @@ from inspect3d.camera import View
 from inspect3d.correlation.freedom import Freedom
 from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.state import State
+from inspect3d.register.mobility import spread
 
+LARGEST = 0.1  # of the extent of what is seen: turns much beyond a tenth of a radian are no longer linear
 LONGEST = 2.0  # times the bound, of one node
 SMALL = 1e-12  # px
 VAGUE = 1e-6  # share of the stiffest motion's stiffness; softer ones are held
@@ -23,7 +25,8 @@ def bounded_step(
     """Return the step (m,) of the cameras, damped until it moves the pictures of the part no farther than a bound.
 
     Where little but planes is seen, the pictures hardly tell a slide of all cameras along them, and what else is wrong
-    asks for slides of many pixels.
+    asks for slides of many pixels. Nor do they tell well how cameras go round a part: before none it moves by more than
+    a tenth of its extent.
 
     Parameters
     ----------
@@ -44,7 +47,8 @@ def bounded_step(
     while True:
         cameras: Floats = modes @ (pulls / (values + damping * values[-1]))
         there = np.concatenate([view.project(scene.sample) for view in freedom.moved(views, cameras)])
-        if not ((there - here) ** 2).sum(axis=1).mean() > farthest**2:
+        near = reach(scene, cameras, freedom) <= LARGEST * scene.extent
+        if near and not ((there - here) ** 2).sum(axis=1).mean() > farthest**2:
             return cameras
         damping = max(2 * damping, VAGUE)
 
@@ -72,3 +76,12 @@ def bounded(
     share = min(1.0, farthest / max(float(np.sqrt((apart**2).mean())), SMALL))
     each = 1.0 if scene.space.confined else np.minimum(1.0, LONGEST * farthest / np.maximum(share * apart, SMALL))
     return share * each * shape, share * cameras
+
+
+def reach(scene: Scene, cameras: Floats, freedom: Freedom) -> float:
+    """Return how far a step of the poses moves the part before a camera, mm."""
+    if freedom.poses == "known":
+        return 0.0
+    motions = freedom.spread(np.arange(6))[0] @ cameras
+    length = spread(scene.nodes, np.ones(len(scene.nodes)), scene.centre)
+    return float(np.abs(motions.reshape(-1, 6) * np.array([length] * 3 + [1.0] * 3)).max())

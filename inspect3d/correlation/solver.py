@@ -10,7 +10,7 @@ from scipy import sparse
 
 from inspect3d.arrays import Floats, Integers
 from inspect3d.camera import View
-from inspect3d.correlation.bounded_step import bounded, bounded_step
+from inspect3d.correlation.bounded_step import bounded, bounded_step, reach
 from inspect3d.correlation.conjugate import conjugate
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.linear import noise_of, robust, slides_of, system_of
@@ -24,7 +24,6 @@ from inspect3d.correlation.still import across_in_pictures, slides_in_pictures, 
 from inspect3d.correlation.systematic import Systematic
 from inspect3d.outcome import MeasurementError
 from inspect3d.register.gauge import FREE
-from inspect3d.register.mobility import spread
 
 SHORTER, LONGER, LEAST, PATIENCE = 0.5, 1.2, 0.02, 4
 WORSE = 1.02  # times the variance of the residuals before it: a step that leads to more went too far
@@ -149,7 +148,7 @@ class Solver:
                 shape, cameras = bounded(scene, state, freedom, shape, cameras, max(level.blur, FARTHEST))
             change = max(
                 float(np.abs(rows @ shape)[~scene.slivers].max(initial=0.0)),
-                _reach(scene, cameras, freedom) if level.moves in ON_NOMINAL else 0,
+                reach(scene, cameras, freedom) if level.moves in ON_NOMINAL else 0,
             )
             if count >= PATIENCE:
                 factor = max(factor * SHORTER, LEAST) if shape @ last < 0 else min(factor * LONGER, 1.0)
@@ -272,12 +271,3 @@ def _equations(scene: Scene, found: Facets, noise: float, state: State, level: L
     matrix, plate = space.matrix(scene, found.node * factors[:, None, None], level.stiffness)
     right = space.gathered(scene, found.right * (state.weights / noise)[:, None])
     return matrix, right - plate @ state.motion
-
-
-def _reach(scene: Scene, cameras: Floats, freedom: Freedom) -> float:
-    """Return how far a step of the poses moves the part before a camera, mm."""
-    if freedom.poses == "known":
-        return 0.0
-    motions = freedom.spread(np.arange(6))[0] @ cameras
-    length = spread(scene.nodes, np.ones(len(scene.nodes)), scene.centre)
-    return float(np.abs(motions.reshape(-1, 6) * np.array([length] * 3 + [1.0] * 3)).max())
