@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -72,7 +72,7 @@ class SplineSpace:
         flat = (self._rows @ motion)[scene.triangles]
         at_samples = (self.samples @ self._spread(motion)).reshape(len(flat), -1) - flat @ _shapes().T
         found = np.empty_like(points.places)
-        cubics = at_samples @ np.linalg.pinv(_cubics()).T
+        cubics = at_samples @ _to_cubics()
         bend(points.starts, points.shapes, scene.triangles, scene.normals, cubics, points.places, found)
         return replace(points, places=found)
 
@@ -190,14 +190,16 @@ def sample_points() -> Floats:
     return _shapes()
 
 
+@cache
 def _shapes() -> Floats:
     from inspect3d.correlation.evaluation import centres
 
     return centres(SAMPLES)
 
 
-def _cubics() -> Floats:
-    """Return the ten cubic monomials in barycentric coordinates at the sample points, (16, 10)."""
+@cache
+def _to_cubics() -> Floats:
+    """Return what values at the sample points give each of the ten cubic monomials of the fit, (16, 10)."""
     from inspect3d.correlation.point_kernel import cubic_monomials
 
-    return np.array([cubic_monomials(*row) for row in _shapes().tolist()])
+    return np.linalg.pinv(np.array([cubic_monomials(*row) for row in _shapes().tolist()])).T
