@@ -83,6 +83,8 @@ class Nurbs:
         columns, values = self._weighed(uv)
         turned = np.empty((*values.shape, ways))
         turn_towards(columns, self.frames[:, :ways], np.ascontiguousarray(towards), values, turned)
+        if ways == 1:
+            return self._spread(columns, turned[:, :, 0])
         each = np.empty(turned.shape, dtype=np.int32)
         each[:] = ways * columns[:, :, None] + np.arange(ways)
         wide = (len(uv), ways * columns.shape[1])
