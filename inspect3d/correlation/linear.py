@@ -134,7 +134,7 @@ def system_of(
     """
     space, weights = scene.space, (factors / noise)[:, None, None]
     if motion is None:
-        motion = space.factored(scene, space.matrix(scene, found.node * weights, stiffness)[0])
+        motion = space.factored(scene, space.matrix(scene, found.node * weights, stiffness))
     still = still or Still(gauge_of(scene, freedom), slides, slides / scale[:, None] ** 2)
     gauge = space.rows(scene).T @ still.gauge
     mixing, sigmas = freedom.spread(columns)

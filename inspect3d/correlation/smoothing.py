@@ -58,7 +58,7 @@ class Smoothing:
 
     @cached_property
     def _information(self) -> Matrix:
-        return self.scene.space.matrix(self.scene, self.blocks, 0.0)[0]
+        return self.scene.space.matrix(self.scene, self.blocks, 0.0)
 
     @cached_property
     def _stiff(self) -> Factored:
@@ -67,4 +67,4 @@ class Smoothing:
     def _factored(self, share: float) -> Factored:
         """Return the factor of s K + λR."""
         space = self.scene.space
-        return space.factored(self.scene, space.matrix(self.scene, share * self.blocks, self.stiffness / share)[0])
+        return space.factored(self.scene, space.matrix(self.scene, share * self.blocks, self.stiffness / share))

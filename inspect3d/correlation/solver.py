@@ -18,7 +18,7 @@ from inspect3d.correlation.normal import Facets, facets
 from inspect3d.correlation.picture import Pictures, Stack
 from inspect3d.correlation.scene import Scene
 from inspect3d.correlation.shift import Shift, needed_columns, shift_blocks, shift_of
-from inspect3d.correlation.space import Factored, Matrix
+from inspect3d.correlation.space import Factored
 from inspect3d.correlation.state import ON_NOMINAL, Level, State, Step
 from inspect3d.correlation.still import across_in_pictures, slides_in_pictures, still_in_pictures, stilled
 from inspect3d.correlation.systematic import Systematic
@@ -108,7 +108,7 @@ class Solver:
         fine, coarse = (FINE_FEW, COARSE_FEW) if scene.space.confined else (0.0, COARSE)
         tolerance = max(self.tolerance, fine if final else coarse * max(1.0, level.blur))
         last, factor = np.zeros(len(state.motion)), 1.0
-        rows = scene.space.rows(scene)
+        space, rows = scene.space, scene.space.rows(scene)
         shared = self.systematic if final and freedom.unknowns and level.moves == "both" else None
         columns = needed_columns(freedom, shared)
         known = None if shared is None else shift_of(scene, state.views, shared)
@@ -167,6 +167,8 @@ class Solver:
             state = replace(stride(freedom, factor), weights=weights)
             if state.settled:
                 break
+            if space.confined and np.linalg.norm(shape) > SHORTER * np.linalg.norm(last):
+                similar = None
             last = shape
             before = stride if freedom.unknowns else None
         return state
@@ -237,7 +239,7 @@ def _step(
     system = system_of(
         scene, found, factors, noise, freedom, columns, scale, slides, level.stiffness, blocks, still=still
     )
-    shape, together = system.solve(_equations(scene, found, noise, state, level)[1], camera_right)
+    shape, together = system.solve(_right(scene, found, noise, state, level), camera_right)
     cameras, shift = np.split(together, [len(sigmas)])
     if placing and scene.space.confined:
         shape, cameras = stilled(scene, freedom, state.views, state.deviation, shape, cameras)
@@ -250,10 +252,14 @@ def _step_of_shape(
 ) -> tuple[Floats, Factored | None]:
     """Return the step with the cameras held, and a factor that may serve the next step as one of before may this.
 
-    Without a plate that is stiffer than the pictures the diagonal comes so near to the matrix that it takes none.
+    Without a plate that is stiffer than the pictures the diagonal comes so near to the matrix that it takes none. Few
+    unknowns take the factor of before as it is, which is dropped when steps do not shrink by half: they go to the same
+    end.
     """
-    matrix, right = _equations(scene, found, noise, state, level)
-    shape = None
+    right = _right(scene, found, noise, state, level)
+    if scene.space.confined and similar is not None:
+        return similar.solve(right), similar
+    matrix, shape = scene.space.matrix(scene, _blocks(found, noise, state), level.stiffness), None
     if level.stiffness <= 1 and not scene.space.confined:
         diagonal = matrix.diagonal()
         shape = conjugate(matrix, right, lambda rest: rest / diagonal, MOST_PLAIN)
@@ -265,9 +271,12 @@ def _step_of_shape(
     return shape, similar
 
 
-def _equations(scene: Scene, found: Facets, noise: float, state: State, level: Level) -> tuple[Matrix, Floats]:
-    """Return matrix and right-hand side (k,) of the shape, with the plate of the level."""
-    space, factors = scene.space, state.weights * found.clean / noise
-    matrix, plate = space.matrix(scene, found.node * factors[:, None, None], level.stiffness)
-    right = space.gathered(scene, found.right * (state.weights / noise)[:, None])
-    return matrix, right - plate @ state.motion
+def _right(scene: Scene, found: Facets, noise: float, state: State, level: Level) -> Floats:
+    """Return the right-hand side (k,) of the shape, with the plate of the level."""
+    plate = scene.space.plate(scene, _blocks(found, noise, state), level.stiffness)
+    return scene.space.gathered(scene, found.right * (state.weights / noise)[:, None]) - plate @ state.motion
+
+
+def _blocks(found: Facets, noise: float, state: State) -> Floats:
+    """Return the normal matrices (f, 3, 3) 1/mm² of the facets' corners."""
+    return found.node * (state.weights * found.clean / noise)[:, None, None]

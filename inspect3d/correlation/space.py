@@ -57,11 +57,11 @@ class Space(Protocol):
     def at_corners(self, scene: Scene, motions: Floats) -> Floats:
         """Return how motions (k, m) move the corners of the facets, (f, 3, m)."""
 
-    def matrix(self, scene: Scene, blocks: Floats, stiffness: float) -> tuple[Matrix, Matrix]:
-        """Return the sum of the facets' blocks (f, 3, 3) with a plate under it, and the plate, (k, k); see `plates`.
+    def matrix(self, scene: Scene, blocks: Floats, stiffness: float) -> Matrix:
+        """Return the sum (k, k) of the facets' blocks (f, 3, 3), with the plate and what supports it; see `plates`."""
 
-        The plate is what pulls the shape back to the nominal one.
-        """
+    def plate(self, scene: Scene, blocks: Floats, stiffness: float) -> Matrix:
+        """Return the plate (k, k) that pulls the shape back to the nominal one."""
 
     def factored(self, scene: Scene, matrix: Matrix) -> Factored:
         """Return the factor of such a matrix.
@@ -114,11 +114,15 @@ class EveryNode:
         """Return the motions of the nodes that are corners."""
         return motions[scene.triangles]
 
-    def matrix(self, scene: Scene, blocks: Floats, stiffness: float) -> tuple[Matrix, Matrix]:
-        """Return sparse matrices."""
+    def matrix(self, scene: Scene, blocks: Floats, stiffness: float) -> sparse.csr_matrix:
+        """Return a sparse matrix."""
         values = scene.assembled(blocks)
-        plate, support = plates(scene, values, stiffness)
-        return scene.matrix(values + plate + support), scene.matrix(plate)
+        plate, support = plates(scene, values[scene.diagonal], stiffness)
+        return scene.matrix(values + plate + support)
+
+    def plate(self, scene: Scene, blocks: Floats, stiffness: float) -> sparse.csr_matrix:
+        """Return a sparse matrix."""
+        return scene.matrix(plates(scene, scene.gathered(np.einsum("fii->fi", blocks)), stiffness)[0])
 
     def factored(self, scene: Scene, matrix: Matrix) -> Factor:
         """Return the sparse factor."""
@@ -147,16 +151,16 @@ class EveryNode:
 EVERY_NODE = EveryNode()
 
 
-def plates(scene: Scene, values: Floats, stiffness: float) -> tuple[Floats, Floats]:
+def plates(scene: Scene, diagonal: Floats, stiffness: float) -> tuple[Floats, Floats]:
     """Return a plate for a nodal matrix and what supports it always, both in the scene's pattern.
 
     Parameters
     ----------
-    values : of the nodal matrix
+    diagonal : (n,) of the nodal matrix
     stiffness : of the plate, in medians of the diagonal. A millionth of that stays always, to carry nodes that show no
         texture, a hundredth for those of which slivers are seen only, and a billionth of a ridge
     """
-    median = typical(values[scene.diagonal])
+    median = typical(diagonal)
     support = SUPPORT * median * scene.support
     support[scene.diagonal] += RIDGE * median
     return stiffness * median * scene.plate, support

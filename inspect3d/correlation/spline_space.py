@@ -87,13 +87,16 @@ class SplineSpace:
         """Return the corners of the planes that fit best."""
         return (self._packed @ self._spread(motions)).reshape(len(scene.triangles), 3, *motions.shape[1:])
 
-    def matrix(self, scene: Scene, blocks: Floats, stiffness: float) -> tuple[Matrix, Matrix]:
-        """Return full matrices; a soft plate always stays, for control points that hardly anything shows."""
-        median = typical(scene.gathered(np.einsum("fii->fi", blocks)))
-        plate = median * (max(stiffness, SOFT) * scene.plate_of_motions + RIDGE * self._square)
+    def matrix(self, scene: Scene, blocks: Floats, stiffness: float) -> Floats:
+        """Return a full matrix."""
         found = congruent(_in_blocks(blocks), self._packed)
         found = found if self.free is None else self.free.T @ found @ self.free
-        return found + plate, plate
+        return found + self.plate(scene, blocks, stiffness)
+
+    def plate(self, scene: Scene, blocks: Floats, stiffness: float) -> Floats:
+        """Return a full matrix; a soft plate always stays, for control points that hardly anything shows."""
+        median = typical(scene.gathered(np.einsum("fii->fi", blocks)))
+        return median * (max(stiffness, SOFT) * scene.plate_of_motions + RIDGE * self._square)
 
     def pushes(self, scene: Scene, blocks: Floats) -> Floats:
         """Return the scores (n, k) that a unit of each motion gives nodes which move by themselves.
