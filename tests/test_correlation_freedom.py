@@ -11,7 +11,7 @@ from scipy import sparse
 from inspect3d.arrays import unit
 from inspect3d.camera import View
 from inspect3d.correlation import solver
-from inspect3d.correlation.bounded_step import bounded
+from inspect3d.correlation.bounded_step import bounded, bounded_step, reach
 from inspect3d.correlation.dense import DenseFactor, cholesky
 from inspect3d.correlation.freedom import Freedom, Lens
 from inspect3d.correlation.hidden import hidden_motions
@@ -207,6 +207,15 @@ def narrow(seen):
     """Return a strip of a sheet."""
     middles = seen.nodes[seen.triangles].mean(axis=1)
     return seen.restricted(np.abs(middles[:, 1] - seen.centre[1]) < 0.1 * np.ptp(seen.nodes[:, 1]))[0]
+
+
+def test_a_step_of_the_poses_goes_round_the_part_by_no_more_than_a_tenth_of_its_extent(wavy):
+    _, views, seen, _ = wavy
+    free = Freedom("free", (Lens(),) * 2, tuple(views), seen.centre)
+    scale, right = free.scale(views, seen.sample), np.random.default_rng(0).normal(size=free.unknowns)
+    for far in (1e3, 1e6):
+        step = bounded_step(seen, views, free, np.diag(scale), np.eye(len(scale)), far * right / scale, 1e9)
+        assert 0.04 * seen.extent < reach(seen, step, free) <= 0.1 * seen.extent
 
 
 def test_a_tilt_of_a_narrow_plane_is_not_taken_for_a_slide(flat):

@@ -117,7 +117,7 @@ def _near(patch: Nurbs, points: Floats, guess: Floats) -> tuple[Floats, Floats]:
     places, *tangents = patch.tangents(uv)
     normals = patch.normals(uv, (tangents[0], tangents[1]))
     away = np.linalg.norm(places - points, axis=1)
-    usual = np.median(away) if len(away) else 0.0  # nobody sees the whole of any facet of a face
+    usual = np.median(away) if len(away) else 0.0  # none: of this face no facet is seen whole
     doubted = ((uv <= low) | (uv >= high)).any(axis=1) | (away > FAR * usual)
     uv[doubted] = patch.parameters(points[doubted])
     normals[doubted] = patch.normals(uv[doubted])

@@ -25,8 +25,8 @@ def bounded_step(
     """Return the step (m,) of the cameras, damped until it moves the pictures of the part no farther than a bound.
 
     Where little but planes is seen, the pictures hardly tell a slide of all cameras along them, and what else is wrong
-    asks for slides of many pixels. Nor do they tell well how cameras go round a part: before none it moves by more than
-    a tenth of its extent.
+    asks for slides of many pixels. Nor do they tell well how each camera goes round the part: it moves before none of
+    them by more than a tenth of its extent.
 
     Parameters
     ----------
@@ -44,13 +44,16 @@ def bounded_step(
     values, modes = values[told], firm @ modes[:, told]
     pulls, damping = modes.T @ right, 0.0
     here = np.concatenate([view.project(scene.sample) for view in views])
-    while True:
-        cameras: Floats = modes @ (pulls / (values + damping * values[-1]))
+
+    def far(cameras: Floats) -> bool:
+        if reach(scene, cameras, freedom) > LARGEST * scene.extent:
+            return True
         there = np.concatenate([view.project(scene.sample) for view in freedom.moved(views, cameras)])
-        near = reach(scene, cameras, freedom) <= LARGEST * scene.extent
-        if near and not ((there - here) ** 2).sum(axis=1).mean() > farthest**2:
-            return cameras
+        return bool(((there - here) ** 2).sum(axis=1).mean() > farthest**2)
+
+    while far(cameras := modes @ (pulls / (values + damping * values[-1]))):
         damping = max(2 * damping, VAGUE)
+    return cameras
 
 
 def bounded(
