@@ -222,7 +222,9 @@ def _step(
     camera_right = mixing.T @ found.camera_right / noise - freedom.offset(state.views) / sigmas**2
     if level.moves in ON_NOMINAL:
         matrix = mixing.T @ found.camera @ mixing / noise + np.diag(1 / sigmas**2)
-        across = across_in_pictures(scene, freedom, state.views, slides)
+        across = slides / scale[:, None] ** 2
+        if freedom.poses == "free":
+            across = across_in_pictures(scene, freedom, state.views, slides)
         firm = np.linalg.svd(across * scale[:, None])[0][:, slides.shape[1] :] * scale[:, None]
         cameras = bounded_step(
             scene, state.views, freedom, firm, firm.T @ matrix @ firm, camera_right, max(level.blur, FARTHEST)

@@ -108,7 +108,8 @@ def slides_in_pictures(scene: Scene, freedom: Freedom, views: Sequence[View], sl
 def across_in_pictures(scene: Scene, freedom: Freedom, views: Sequence[View], slides: Floats) -> Floats:
     """Return N (m, s) by which cameras that do not slide the surface in the mean of the pictures have N'p = 0.
 
-    To hold them along the slides alone would not do: turns and shifts of each camera make much the same of a slide.
+    To hold them along the slides alone would not do where each camera has a pose of its own: turns and shifts of each
+    make much the same of a slide.
 
     Parameters
     ----------
