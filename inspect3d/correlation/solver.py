@@ -108,7 +108,7 @@ class Solver:
         fine, coarse = (FINE_FEW, COARSE_FEW) if scene.space.confined else (0.0, COARSE)
         tolerance = max(self.tolerance, fine if final else coarse * max(1.0, level.blur))
         last, factor = np.zeros(len(state.motion)), 1.0
-        space, rows = scene.space, scene.space.rows(scene)
+        rows = scene.space.rows(scene)
         shared = self.systematic if final and freedom.unknowns and level.moves == "both" else None
         columns = needed_columns(freedom, shared)
         known = None if shared is None else shift_of(scene, state.views, shared)
@@ -167,8 +167,6 @@ class Solver:
             state = replace(stride(freedom, factor), weights=weights)
             if state.settled:
                 break
-            if space.confined and np.linalg.norm(shape) > SHORTER * np.linalg.norm(last):
-                similar = None
             last = shape
             before = stride if freedom.unknowns else None
         return state
@@ -254,13 +252,9 @@ def _step_of_shape(
 ) -> tuple[Floats, Factored | None]:
     """Return the step with the cameras held, and a factor that may serve the next step as one of before may this.
 
-    Without a plate that is stiffer than the pictures the diagonal comes so near to the matrix that it takes none. Few
-    unknowns take the factor of before as it is, which is dropped when steps do not shrink by half: they go to the same
-    end.
+    Without a plate that is stiffer than the pictures the diagonal comes so near to the matrix that it takes none.
     """
     right = _right(scene, found, noise, state, level)
-    if scene.space.confined and similar is not None:
-        return similar.solve(right), similar
     matrix, shape = scene.space.matrix(scene, _blocks(found, noise, state), level.stiffness), None
     if level.stiffness <= 1 and not scene.space.confined:
         diagonal = matrix.diagonal()
