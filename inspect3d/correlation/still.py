@@ -87,7 +87,7 @@ def still_in_pictures(scene: Scene, freedom: Freedom, views: Sequence[View]) -> 
     sliding = sizes > SLIDING * sizes[0]
     gauge = np.column_stack([left[:, ~soft], (left * values)[:, soft] @ turns[~sliding].T])
     slides = changes @ turns[sliding].T
-    return Still(gauge, slides, across_in_pictures(scene, freedom, views, slides))
+    return Still(gauge, slides, flow.T @ (flow @ slides))
 
 
 def slides_in_pictures(scene: Scene, freedom: Freedom, views: Sequence[View], slides: Floats) -> Still | None:
